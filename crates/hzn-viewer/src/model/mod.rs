@@ -19,6 +19,7 @@ pub mod sequence;
 pub mod session;
 pub mod settings;
 pub mod sheet;
+pub mod sigma_parts;
 pub mod slider_range;
 pub mod steady_edge;
 pub mod view;

@@ -5,7 +5,7 @@ use hzn_files::truth::Truth;
 use hzn_mcap::Row;
 
 /// A quantity that can be plotted over time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantity {
     /// Name of the quantity.
     pub name: &'static str,
@@ -15,14 +15,22 @@ pub struct Quantity {
     pub lines: &'static [(&'static str, RowValue)],
     /// True if only some sequences have values; without values it is not offered.
     pub is_optional: bool,
+    /// Range in which nearly all values of a right sensor lie.
+    pub band: Option<[f64; 2]>,
+}
+
+impl Quantity {
+    const fn with_band(self, band: [f64; 2]) -> Self {
+        Self { band: Some(band), ..self }
+    }
 }
 
 const fn always(name: &'static str, unit: &'static str, lines: &'static [(&'static str, RowValue)]) -> Quantity {
-    Quantity { name, unit, lines, is_optional: false }
+    Quantity { name, unit, lines, is_optional: false, band: None }
 }
 
 const fn optional(name: &'static str, unit: &'static str, lines: &'static [(&'static str, RowValue)]) -> Quantity {
-    Quantity { name, unit, lines, is_optional: true }
+    Quantity { name, unit, lines, is_optional: true, band: None }
 }
 
 /// Function that returns a value of a result, possibly compared with the truth.
@@ -33,11 +41,8 @@ pub const QUANTITIES: &[Quantity] = &[
     always("Axis", "", &[("x", |r, _| r.axis_x), ("y", |r, _| r.axis_y), ("z", |r, _| r.axis_z)]),
     always("3 sigma", "°", &[("3σ", |r, _| Some(3.0 * r.sigma_max_deg?))]),
     optional("Error (truth)", "°", &[("error", error_deg), ("3σ", |r, t| t.and(Some(3.0 * r.sigma_max_deg?)))]),
-    optional(
-        "Error over σ (truth)",
-        "",
-        &[("error/σ", error_sigmas), ("3σ", |r, t| error_sigmas(r, t).and(Some(3.0)))],
-    ),
+    // The error has no sign, because it is the root of the NEES.
+    optional("Error over σ (truth)", "", &[("error/σ", error_sigmas)]).with_band([0.0, 3.0]),
     always("RMS", "px", &[("rms", |r, _| r.rms_px)]),
     optional("Probability of the limb", "", &[("p", |r, _| r.p_limb)]),
     optional(
@@ -52,15 +57,7 @@ pub const QUANTITIES: &[Quantity] = &[
     ),
     always("Half-angle", "°", &[("fitted", |r, _| r.half_angle_deg)]),
     always("Altitude", "km", &[("estimated", |r, _| r.altitude_est_km), ("given", |r, _| r.altitude_km)]),
-    optional(
-        "Fit − expected over σ",
-        "",
-        &[
-            ("altitude", altitude_sigmas),
-            ("+3σ", |r, t| altitude_sigmas(r, t).and(Some(3.0))),
-            ("−3σ", |r, t| altitude_sigmas(r, t).and(Some(-3.0))),
-        ],
-    ),
+    optional("Fit − expected over σ", "", &[("altitude", altitude_sigmas)]).with_band([-3.0, 3.0]),
     optional(
         "Position",
         "km",

@@ -8,6 +8,7 @@ use hzn_mcap::Row;
 use super::cause::{Cause, Group};
 use super::diagnosis::FitFacts;
 use super::quantity::angle_deg;
+use super::sigma_parts::SigmaParts;
 use super::steady_edge::{EdgeCells, SteadyEdges};
 
 /// Results by picture and body: those of the file, of the current parameters, of the parameters before, and of the
@@ -35,6 +36,8 @@ pub struct Processed {
     pub causes: Vec<Cause>,
     /// Fit of each body's longest edge, if there is one.
     pub fits: Vec<Option<FitFacts>>,
+    /// Sources of each result's sigma, if there is an answer.
+    pub sigma_parts: Vec<Option<SigmaParts>>,
     /// Where the picture has edges.
     pub edges: EdgeCells,
 }
@@ -148,6 +151,14 @@ impl ResultHistory {
     /// Returns the fits of the current parameters.
     pub fn fits(&self, body: usize) -> impl Iterator<Item = &FitFacts> + Clone {
         self.current.values().filter_map(move |p| p.fits.get(body)?.as_ref())
+    }
+    /// Returns the sources of the sigma with the current parameters.
+    pub fn sigma_parts(&self, index: usize, body: usize) -> Option<SigmaParts> {
+        self.current.get(&index)?.sigma_parts.get(body).copied().flatten()
+    }
+    /// Returns true if a picture has the sources of its sigma.
+    pub fn has_sigma_parts(&self, body: usize) -> bool {
+        self.current.values().any(|p| p.sigma_parts.get(body).is_some_and(Option::is_some))
     }
     /// Returns the newest results of all pictures and bodies, in order.
     pub fn all(&self) -> impl Iterator<Item = &Row> {

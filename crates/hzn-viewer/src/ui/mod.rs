@@ -28,6 +28,7 @@ mod parameters;
 mod path_dialog;
 mod picture;
 mod placement;
+mod plot_cursor;
 mod plots;
 mod questions;
 mod rig;

@@ -2,6 +2,7 @@
 
 use egui::Vec2;
 
+use super::plot_cursor::PlotCursor;
 use crate::model::Settings;
 
 /// Width in points below which the stages lie over the picture.
@@ -28,11 +29,23 @@ pub(super) struct Panels {
     stages: bool,
     /// Number of times that the panel of the plots was made higher for a new plot.
     pub(super) grown: u32,
+    /// The user has dragged the border of the plots.
+    pub(super) plots_dragged: bool,
+    /// The line in the plots that marks the shown picture.
+    pub(super) cursor: PlotCursor,
 }
 
 impl Default for Panels {
     fn default() -> Self {
-        Self { size: Vec2::INFINITY, answer: false, plots: false, stages: false, grown: 0 }
+        Self {
+            size: Vec2::INFINITY,
+            answer: false,
+            plots: false,
+            stages: false,
+            grown: 0,
+            plots_dragged: false,
+            cursor: PlotCursor::default(),
+        }
     }
 }
 

@@ -33,9 +33,17 @@ const PNG_SCALE: u32 = 3;
 /// The PNG is drawn this much larger and then made smaller, which gives lines and letters smooth edges.
 const OVERSAMPLING: u32 = 2;
 /// The colours of Okabe and Ito, which colour-blind people can distinguish.
-const COLOURS: [RGBColor; 4] =
-    [RGBColor(0, 114, 178), RGBColor(213, 94, 0), RGBColor(0, 158, 115), RGBColor(204, 121, 167)];
+const COLOURS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(230, 159, 0),
+    RGBColor(140, 140, 140),
+];
 const REFUSED: RGBColor = RGBColor(150, 150, 150);
+const BAND: RGBColor = RGBColor(0, 158, 115);
 
 /// Points of a line; a missing value begins a new part.
 pub type Parts = Vec<Vec<[f64; 2]>>;
@@ -47,6 +55,8 @@ pub struct PlotRow {
     pub title: String,
     /// Name and points of each line.
     pub lines: Vec<(String, Parts)>,
+    /// Range in which nearly all values of a right sensor lie.
+    pub band: Option<[f64; 2]>,
 }
 
 /// Plots with the same horizontal axis.
@@ -139,7 +149,8 @@ fn draw_row<B: DrawingBackend>(
     is_last: bool,
     scale: u32,
 ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
-    let values = row.lines.iter().flat_map(|(_, parts)| parts.iter().flatten()).map(|p| p[1]);
+    let of_lines = row.lines.iter().flat_map(|(_, parts)| parts.iter().flatten()).map(|p| p[1]);
+    let values = of_lines.chain(row.band.into_iter().flatten());
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
     let room = (0.08 * (high - low)).max(1e-6 * high.abs()).max(1e-9);
     let [first, last] = sheet.ends;
@@ -166,6 +177,9 @@ fn draw_row<B: DrawingBackend>(
             .iter()
             .map(|[from, to]| Rectangle::new([(*from, low - room), (*to, high + room)], REFUSED.mix(0.25).filled())),
     )?;
+    if let Some([from, to]) = row.band {
+        chart.draw_series([Rectangle::new([(first, from), (last, to)], BAND.mix(0.16).filled())])?;
+    }
     let mut mesh = chart.configure_mesh();
     mesh.light_line_style(TRANSPARENT).y_labels(5).label_style(font(12));
     mesh.axis_style(BLACK.stroke_width(scale)).bold_line_style(BLACK.mix(0.15).stroke_width(scale));
@@ -225,6 +239,7 @@ mod tests {
                 .iter()
                 .map(|name| ((*name).into(), vec![vec![[0.0, 1.0], [1.0, 2.0]], vec![[3.0, 1.5]]]))
                 .collect(),
+            band: None,
         };
         let rows = vec![row("3 sigma [°]", &["3σ"]), row("Axis", &["x", "y"])];
         let sheet = PlotSheet {
@@ -244,6 +259,9 @@ mod tests {
         assert_eq!((drawn("#0072B2"), drawn("#D55E00")), (5, 3), "{text}");
         let circles = text.matches("<circle").count();
         assert_eq!(circles, 3, "a part of one point is a dot");
+        let banded = PlotRow { band: Some([-3.0, 3.0]), ..row("Error over σ", &["error/σ"]) };
+        let text = svg(&PlotSheet { rows: vec![banded], ..sheet.clone() }).unwrap();
+        assert_eq!(text.to_lowercase().matches("#009e73").count(), 1, "the band is one area: {text}");
         let empty = PlotSheet { rows: Vec::new(), ..sheet.clone() };
         assert_eq!(svg(&empty), Err("no chosen plot has a value".into()));
         assert!(png(&empty).is_err());

@@ -11,6 +11,7 @@ use super::trials::Trials;
 use crate::model::Processed;
 use crate::model::cause::Cause;
 use crate::model::diagnosis::find_fit;
+use crate::model::sigma_parts::SigmaParts;
 use crate::model::steady_edge::EdgeCells;
 
 /// Processes a picture and returns its results with their causes and fits. Without `trials` there are only results.
@@ -43,6 +44,7 @@ pub(super) fn summarise(
             let status = row.map_or(Status::Unreadable, |r| r.status);
             processed.causes.push(Cause { status, reason: None });
             processed.fits.push(None);
+            processed.sigma_parts.push(None);
             continue;
         };
         let answered = otsu.get(index).is_some_and(|o| o.answered);
@@ -51,6 +53,8 @@ pub(super) fn summarise(
         // The edge of a wrong threshold is not the limb.
         let fit = (!answered).then(|| find_fit(&trace.edges(), report, row.altitude_km, &camera, trial)).flatten();
         processed.fits.push(fit.map(|(facts, _)| facts));
+        let parts = report.solution.as_ref().and_then(|s| SigmaParts::of_answer(s, &trace.edges()));
+        processed.sigma_parts.push(parts);
     }
     let size = [input.picture.layout.width, input.picture.layout.height];
     let each: Vec<_> = traces.each.iter().map(|trace| trace.edges()).collect();

@@ -11,6 +11,7 @@ mod live;
 mod mouse;
 mod overwrite;
 mod palette;
+mod plots;
 mod rig;
 mod small;
 mod steady;

@@ -174,12 +174,12 @@ mod tests {
         assert!(tick_values(1.0, 1.0).is_empty() && tick_values(f64::NAN, 1.0).is_empty());
     }
 
-    /// A label is 15 points high in a plot of 58 points.
+    /// A label is 15 points high in a plot of 46 points.
     #[test]
     fn a_low_plot_has_lines_that_leave_room_for_labels() {
         for (low, high) in (0..200).map(|n| (0.05 * f64::from(n % 17), 0.9 + 0.037 * f64::from(n))) {
-            let marks = ticks(GridInput { bounds: (low, high), base_step_size: 0.0 }, 3.0, 58.0 / 15.0);
-            let apart = marks.first().map(|m| 58.0 * m.step_size / (high - low));
+            let marks = ticks(GridInput { bounds: (low, high), base_step_size: 0.0 }, 3.0, 46.0 / 15.0);
+            let apart = marks.first().map(|m| 46.0 * m.step_size / (high - low));
             assert!(apart.is_some_and(|points| points >= 15.0), "{low} {high}: {apart:?}");
         }
     }

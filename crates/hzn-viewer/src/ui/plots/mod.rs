@@ -7,6 +7,7 @@ mod offered;
 mod over_time;
 mod residuals;
 mod sheet;
+mod sigma_parts;
 
 use egui::{RichText, ScrollArea, Ui};
 
@@ -17,20 +18,29 @@ pub(super) use frame::{set_label, shared_plot};
 pub(super) use over_time::{MARGIN, TimeAxis};
 pub(super) use residuals::RESIDUALS;
 pub(super) use sheet::sheet;
+use sigma_parts::SIGMA_PARTS;
 
 /// Height of the row of names above the plots, with the space around it.
 const CHOICE: f32 = 44.0;
 /// Height of the row of labels below the plots.
 const RULER: f32 = 24.0;
-/// Lowest height of a plot without its heading; more plots scroll.
-const LEAST_PLOT: f32 = 58.0;
+/// Lowest height of a plot without its heading; more plots scroll. Three labels of 15 points lie below each other.
+const LEAST_PLOT: f32 = 46.0;
 /// Height of a heading.
 const HEADING: f32 = 24.0;
+/// Largest part of the window's height that the panel takes by itself, and that the user can give it by a drag of its
+/// border. The picture is what the window is for.
+const BY_ITSELF: f32 = 0.25;
+const BY_HAND: f32 = 0.5;
+/// Lowest height of the panel, in points. It counts where a part of a low window has no room for the choice and the
+/// time axis.
+const LEAST_PANEL: f32 = 120.0;
+/// Distance from the upper border of the panel in points within which the border is dragged.
+const GRIP: f32 = 6.0;
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
-    // Most of a low window stays for the picture.
-    let window = ui.ctx().content_rect().height();
-    let most = (window * if window < 640.0 { 0.36 } else { 0.5 }).max(120.0);
+    let part = if viewer.panels.plots_dragged { BY_HAND } else { BY_ITSELF };
+    let most = (ui.ctx().content_rect().height() * part).max(LEAST_PANEL);
     let height = viewer.settings.plots_height.min(most);
     let panel = egui::Panel::bottom(("plots", viewer.panels.grown)).resizable(true);
     let panel = panel.default_size(height).size_range(110.0..=most);
@@ -48,17 +58,23 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
             // A plot that this sequence does not have stays chosen for others.
             viewer.settings.plotted.iter().filter(|name| offered.contains(&name.as_str())).cloned().collect()
         };
-        let is_new = viewer.new_plot.is_some();
+        let new = viewer.new_plot.clone();
         rows(viewer, ui, &chosen);
-        is_new.then_some(chosen.len())
+        new.map(|name| (name, chosen.len()))
     });
-    viewer.settings.plots_height = shown.response.rect.height();
-    if let Some(count) = shown.inner {
+    let panel = shown.response.rect;
+    let pressed = ui.input(|i| i.pointer.press_origin().filter(|_| i.pointer.primary_pressed()));
+    let grip = egui::Rect::from_x_y_ranges(panel.x_range(), panel.top() - GRIP..=panel.top() + GRIP);
+    viewer.panels.plots_dragged |= pressed.is_some_and(|at| grip.contains(at));
+    viewer.settings.plots_height = panel.height();
+    if let Some((name, count)) = shown.inner {
         // A panel of another name takes the size that it is given; this one would keep its own.
         let needed = (CHOICE + count as f32 * (LEAST_PLOT + HEADING + 6.0) + RULER + 6.0).min(most);
         if needed > viewer.settings.plots_height {
             viewer.settings.plots_height = needed;
             viewer.panels.grown += 1;
+            // The higher panel begins at its top.
+            viewer.new_plot = Some(name);
         }
     }
 }
@@ -74,6 +90,7 @@ fn rows(viewer: &mut Viewer, ui: &mut Ui, chosen: &[String]) {
     let room = (ui.available_height() - ruler).max(40.0);
     let each = (room / chosen.len() as f32 - HEADING - 6.0).max(LEAST_PLOT);
     let axis = TimeAxis::new(viewer);
+    viewer.panels.cursor.notice(ui);
     let (mut pointed, mut look) = (None, None);
     ScrollArea::vertical().max_height(room).auto_shrink([false, false]).show(ui, |ui| {
         for name in chosen {
@@ -84,6 +101,8 @@ fn rows(viewer: &mut Viewer, ui: &mut Ui, chosen: &[String]) {
                 pointed = over_time::show(viewer, ui, quantity, &axis, each).or(pointed);
             } else if let Some(quantity) = NAV_QUANTITIES.iter().find(|q| q.name == name) {
                 pointed = navigation::show(viewer, ui, quantity, &axis, each).or(pointed);
+            } else if name == SIGMA_PARTS {
+                pointed = sigma_parts::show(viewer, ui, &axis, each).or(pointed);
             } else if name == INNOVATIONS {
                 pointed = navigation::innovations(viewer, ui, &axis, each).or(pointed);
             }
@@ -95,7 +114,11 @@ fn rows(viewer: &mut Viewer, ui: &mut Ui, chosen: &[String]) {
     });
     // The other plots show the values of this picture with the next frame of the window.
     viewer.hovered_frame = pointed.map(|(frame, _)| frame);
-    viewer.plot_span = over_time.then(|| over_time::ruler(ui, &axis, RULER));
+    viewer.plot_span = over_time.then(|| {
+        let (span, cursor_x) = over_time::ruler(ui, &axis, viewer.playback.frame(), RULER);
+        viewer.panels.cursor.x = cursor_x;
+        span
+    });
     if let Some((frame, true)) = pointed {
         viewer.playback.go(frame, viewer.sequence.len());
     }

@@ -2,6 +2,7 @@
 //! and the results of `hzn fuse`.
 
 use super::residuals::RESIDUALS;
+use super::sigma_parts::SIGMA_PARTS;
 use crate::model::navigation::{INNOVATIONS, NAV_QUANTITIES};
 use crate::model::quantity::{QUANTITIES, Quantity};
 use crate::ui::offered::Offered;
@@ -11,7 +12,9 @@ use crate::ui::viewer::Viewer;
 pub(super) fn names(viewer: &mut Viewer) -> Vec<&'static str> {
     let key = (viewer.rows.generation(), viewer.body, viewer.truth.is_empty());
     if viewer.offered.of != Some(key) {
-        let names = QUANTITIES.iter().filter(|q| !q.is_optional || has_value(viewer, q)).map(|q| q.name).collect();
+        let has = |q: &&Quantity| !q.is_optional || has_value(viewer, q);
+        let mut names: Vec<&str> = QUANTITIES.iter().filter(has).map(|q| q.name).collect();
+        names.extend(viewer.rows.has_sigma_parts(viewer.body).then_some(SIGMA_PARTS));
         viewer.offered = Offered { of: Some(key), names };
     }
     let mut names = viewer.offered.names.clone();

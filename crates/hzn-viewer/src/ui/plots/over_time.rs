@@ -1,7 +1,7 @@
 //! Plots of a quantity over all pictures.
 
 use egui::{Color32, Id, Rangef, Ui, vec2};
-use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotUi, Points, Span, VLine};
+use egui_plot::{Axis, Line, LineStyle, MarkerShape, Plot, PlotUi, Points, Span, VLine};
 use hzn_core::status::Status;
 use hzn_mcap::Row;
 
@@ -108,8 +108,9 @@ impl TimeAxis {
     }
 }
 
-/// Draws the labels of the horizontal axis below all plots, and returns where the axis begins and ends.
-pub(super) fn ruler(ui: &mut Ui, axis: &TimeAxis, height: f32) -> Rangef {
+/// Draws the labels of the horizontal axis below all plots. Returns where the axis begins and ends on the screen, and
+/// where the picture `frame` lies, if it is in view.
+pub(super) fn ruler(ui: &mut Ui, axis: &TimeAxis, frame: usize, height: f32) -> (Rangef, Option<f32>) {
     let plot = with_axis(shared_plot("ruler", height), axis)
         .show_axes([true, true])
         .show_grid([false, false])
@@ -119,7 +120,9 @@ pub(super) fn ruler(ui: &mut Ui, axis: &TimeAxis, height: f32) -> Rangef {
         .x_axis_formatter(axis_labels(axis.unit));
     let shown = plot.show(ui, |_| ());
     set_label(&shown.response, "time axis");
-    shown.transform.frame().x_range()
+    let span = shown.transform.frame().x_range();
+    let x = axis.place(frame).map(|place| shown.transform.position_from_point_x(place));
+    (span, x.filter(|x| span.contains(*x)))
 }
 
 fn with_axis<'a>(plot: Plot<'a>, axis: &TimeAxis) -> Plot<'a> {
@@ -159,19 +162,29 @@ pub(super) fn show(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity, axis: &Tim
     let range = |lines: &[Vec<Option<f64>>]| robust_range(lines.iter().flatten().copied().flatten());
     let title = title(quantity) + if is_log { ", log" } else { "" };
     let ranges = [range(&current), range(&earlier), range(&other)];
-    let Some([low, high]) = ranges.into_iter().flatten().reduce(widen) else {
+    let Some(range) = ranges.into_iter().flatten().reduce(widen) else {
         heading(ui, &title, &[], "");
         ui.weak(why_empty(viewer, quantity));
         return None;
     };
+    let band = quantity.band.map(|band| shown_band(band, is_log, range));
+    // The whole band is seen: a value is judged by it.
+    let [low, high] = band.map_or(range, |[from, to]| {
+        let room = 0.08 * (to - from);
+        [range[0].min(from - room), range[1].max(to + room)]
+    });
     let values_of = |i: usize| {
         let row = Source::Current.row(viewer, i);
         values_text(quantity, |value_of| value_of(row?, viewer.truth_of(&row?.file, &row?.body)))
     };
     let at = viewer.hovered_frame.unwrap_or(viewer.playback.frame());
-    let legend = legend(quantity, ranges[1].is_some(), ranges[2].is_some(), dark);
+    let mut legend = legend(quantity, ranges[1].is_some(), ranges[2].is_some(), dark);
+    legend.extend(band.map(|_| ("within 3σ", band_colour(dark).to_opaque())));
     heading(ui, &title, &legend, &values_of(at));
     frame_plot(viewer, ui, quantity.name, axis, [low, high], is_log, height, &values_of, |ui, column| {
+        if let Some([from, to]) = band {
+            ui.span(Span::new("", from..=to).axis(Axis::Y).fill(band_colour(dark)));
+        }
         let sources = [(&earlier, Style::Faint), (&other, Style::Dashed), (&current, Style::Plain)];
         for (lines, style) in sources {
             for (n, ((name, _), values)) in quantity.lines.iter().zip(lines).enumerate() {
@@ -184,6 +197,19 @@ pub(super) fn show(viewer: &Viewer, ui: &mut Ui, quantity: &Quantity, axis: &Tim
             }
         }
     })
+}
+
+/// Returns the ends of a band on the axis. The logarithm of 0 lies below every value.
+fn shown_band(band: [f64; 2], is_log: bool, [low, _]: [f64; 2]) -> [f64; 2] {
+    band.map(|x| match is_log {
+        true if x > 0.0 => x.log10(),
+        true => low,
+        false => x,
+    })
+}
+
+fn band_colour(dark: bool) -> Color32 {
+    theme::line(2, dark).gamma_multiply(0.16)
 }
 
 /// Draws arrows at the border of a plot for the values outside of it.
@@ -230,6 +256,8 @@ pub(super) fn frame_plot(
         .include_y(low)
         .include_y(high)
         .allow_boxed_zoom(true)
+        // A drag of the cursor does not move the plot.
+        .allow_drag(!viewer.panels.cursor.is_dragged)
         .label_formatter(|_| None);
     let response = plot.show(ui, |ui| {
         shade_refused(viewer, ui, axis, dark);
@@ -241,10 +269,17 @@ pub(super) fn frame_plot(
             ui.vline(VLine::new("", now).color(ink).width(1.5).allow_hover(false));
         }
         let at = ui.response().hovered().then(|| ui.pointer_coordinate()).flatten();
-        (at, ui.response().clicked())
+        // Every plot below the pointer would take the drag, so only the one counts in which it began.
+        let is_slid = viewer.panels.cursor.is_dragged && ui.response().is_pointer_button_down_on();
+        let slid = is_slid.then(|| ui.ctx().input(|i| i.pointer.latest_pos())).flatten();
+        (slid.map(|at| ui.plot_from_screen(at)).or(at), slid.is_some() || ui.response().clicked())
     });
     set_label(&response.response, name);
     let (at, clicked) = response.inner;
+    let pointer = response.response.hover_pos();
+    if viewer.panels.cursor.is_dragged || pointer.is_some_and(|at| viewer.panels.cursor.is_near(at.x)) {
+        response.response.ctx.set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
+    }
     let nearest = axis.nearest(at?.x)?;
     let text = format!("{}\n{}", axis.text(nearest), values_of(nearest));
     response.response.on_hover_text_at_pointer(text.trim_end());

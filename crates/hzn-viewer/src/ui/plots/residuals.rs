@@ -34,15 +34,22 @@ fn chosen(viewer: &Viewer) -> (String, Vec<Residual>) {
     ("Residual [px] by azimuth about the axis".to_owned(), answer.residuals.clone())
 }
 
+/// Returns the largest distance of these points from the limb, at least one pixel.
+fn largest_px<'a>(residuals: impl Iterator<Item = &'a Residual>) -> f64 {
+    residuals.map(|r| r.distance_px.abs()).fold(1.0, f64::max)
+}
+
+/// Returns the end of the axis. Outliers may be hundreds of pixels away, so the inliers and the threshold decide it.
+fn scale_px(all: &[Residual], threshold_px: Option<f64>) -> f64 {
+    let inliers = largest_px(all.iter().filter(|r| r.weight > 0.0));
+    largest_px(all.iter()).min(inliers.max(OUTLIER_THRESHOLDS * threshold_px.unwrap_or(0.0)))
+}
+
 /// Plots the residuals of the edge points along the fitted limb; returns the picture point that was clicked.
 pub(super) fn show(viewer: &Viewer, ui: &mut Ui, height: f32) -> Option<[f64; 2]> {
     let threshold = viewer.frame_view.as_ref().and_then(|s| s.answers.first()).map(|o| o.config.consensus.threshold_px);
     let (title, all) = chosen(viewer);
-    // Outliers may be hundreds of pixels away, so the inliers and the threshold decide the scale.
-    let largest =
-        |residuals: &mut dyn Iterator<Item = &Residual>| residuals.map(|r| r.distance_px.abs()).fold(1.0, f64::max);
-    let inliers = largest(&mut all.iter().filter(|r| r.weight > 0.0));
-    let end = largest(&mut all.iter()).min(inliers.max(OUTLIER_THRESHOLDS * threshold.unwrap_or(0.0)));
+    let end = scale_px(&all, threshold);
     let points = |kept: bool| -> PlotPoints<'_> {
         let inside = all.iter().filter(|r| (r.weight > 0.0) == kept && r.distance_px.abs() <= end);
         inside.map(|r| [r.azimuth_deg, r.distance_px]).collect()
@@ -56,7 +63,7 @@ pub(super) fn show(viewer: &Viewer, ui: &mut Ui, height: f32) -> Option<[f64; 2]
         ui.weak("There are no residuals: no limb is fitted. A click on a candidate with a fit shows its residuals.");
         return None;
     }
-    let farthest = largest(&mut all.iter());
+    let farthest = largest_px(all.iter());
     let text = if farthest > end { format!("▲▼ outliers up to {farthest:.0} px") } else { String::new() };
     heading(ui, &title, &[("inliers", theme::INLIER), ("outliers", theme::REJECTED)], &text);
     let plot = shared_plot("residuals", height)
@@ -84,4 +91,25 @@ pub(super) fn show(viewer: &Viewer, ui: &mut Ui, height: f32) -> Option<[f64; 2]
         p.distance_sq(pointer)
     };
     all.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|r| r.point)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outliers_of_hundreds_of_pixels_do_not_make_the_inliers_flat() {
+        let residual =
+            |distance_px: f64, weight: f64| Residual { azimuth_deg: 0.0, distance_px, weight, point: [0.0; 2] };
+        let mut all: Vec<Residual> = (0..40).map(|i| residual(0.1 * f64::from(i % 21) - 1.0, 1.0)).collect();
+        assert_eq!(scale_px(&all, Some(1.5)), 1.0, "without outliers, the inliers decide");
+        all.push(residual(3.0, 0.0));
+        assert_eq!(scale_px(&all, Some(1.5)), 3.0, "an outlier near the inliers is seen at its place");
+        all.push(residual(-600.0, 0.0));
+        assert_eq!(scale_px(&all, Some(1.5)), 6.0, "four thresholds");
+        assert_eq!(scale_px(&all, None), 1.0);
+        all.push(residual(-9.0, 0.4));
+        assert_eq!(scale_px(&all, Some(1.5)), 9.0, "every inlier is inside");
+        assert_eq!(scale_px(&[], Some(1.5)), 1.0);
+    }
 }

@@ -6,6 +6,7 @@ use hzn_run::provenance;
 use super::axis::polylines;
 use super::navigation;
 use super::over_time::{Source, TimeAxis, refused, series, title};
+use super::sigma_parts::{self, SIGMA_PARTS};
 use crate::model::navigation::{INNOVATIONS, NAV_QUANTITIES};
 use crate::model::quantity::QUANTITIES;
 use crate::ui::viewer::Viewer;
@@ -29,15 +30,28 @@ pub(in crate::ui) fn sheet(viewer: &Viewer) -> PlotSheet {
         }
         lines.retain(|(_, parts)| !parts.is_empty());
         if !lines.is_empty() {
-            rows.push(PlotRow { title: title(quantity), lines });
+            rows.push(PlotRow { title: title(quantity), lines, band: quantity.band });
         }
     }
+    rows.extend(sigma_budget(viewer, &axis));
     rows.extend(navigation(viewer, &axis));
     let heading = format!("{}, {} pictures; grey: without an answer", viewer.sequence.stem(), count);
     let refused = refused(viewer, &axis).into_iter().map(|(_, ends)| ends).collect();
     let hash = viewer.session.as_ref().and_then(|session| provenance::hash(session.config()?));
     let provenance = provenance::line(hash.as_deref(), &provenance::command("hzn view"));
     PlotSheet { heading, axis: axis.label(), ends: axis.ends(), provenance, refused, rows }
+}
+
+/// Returns the parts of sigma, if they are chosen. A file has lines instead of areas.
+fn sigma_budget(viewer: &Viewer, axis: &TimeAxis) -> Option<PlotRow> {
+    let is_chosen = viewer.settings.plotted.iter().any(|name| name == SIGMA_PARTS);
+    let heights = if is_chosen { sigma_parts::heights(&sigma_parts::parts(viewer)) } else { Vec::new() };
+    let line = |(name, values): (&str, Vec<Option<f64>>)| {
+        let value = |i: usize| Some([axis.place(i)?, (*values.get(i)?)?]);
+        (name.to_owned(), polylines(values.len(), 0.0, value))
+    };
+    let lines: Vec<_> = heights.into_iter().map(line).collect();
+    (!lines.is_empty()).then(|| PlotRow { title: format!("{SIGMA_PARTS}, parts of 1σ [°]"), lines, band: None })
 }
 
 /// Returns the chosen plots of the results of `hzn fuse`.
@@ -56,7 +70,7 @@ fn navigation(viewer: &Viewer, axis: &TimeAxis) -> Vec<PlotRow> {
                 lines.push((format!("{name}{more}"), parts));
             }
         }
-        rows.push(PlotRow { title: navigation::title(quantity), lines });
+        rows.push(PlotRow { title: navigation::title(quantity), lines, band: None });
     }
     if chosen(INNOVATIONS) {
         let dots = |points: Vec<[f64; 2]>| points.into_iter().map(|p| vec![p]).collect();
@@ -66,7 +80,7 @@ fn navigation(viewer: &Viewer, axis: &TimeAxis) -> Vec<PlotRow> {
             lines.push((series.name.clone(), dots(taken)));
             lines.push((format!("{} (refused)", series.name), dots(refused)));
         }
-        rows.push(PlotRow { title: navigation::innovations_title(), lines });
+        rows.push(PlotRow { title: navigation::innovations_title(), lines, band: None });
     }
     for row in &mut rows {
         row.lines.retain(|(_, parts)| !parts.is_empty());

@@ -8,6 +8,7 @@ use super::changes::Leave;
 use super::request_key::RequestKey;
 use super::sequence_work::SequenceWork;
 use crate::model::settings::Layer;
+use crate::model::sigma_parts::SigmaParts;
 use crate::model::steady_edge::EdgeCells;
 use crate::model::{Place, Processed, ResultHistory, Sequence, Session, View, autosave};
 use crate::ui::panels::Panel;
@@ -98,6 +99,11 @@ impl Viewer {
                 rows: outcome.bodies.iter().map(|b| b.row.clone()).collect(),
                 causes: outcome.bodies.iter().filter_map(|b| b.cause).collect(),
                 fits: outcome.bodies.iter().map(|b| b.fit).collect(),
+                sigma_parts: outcome
+                    .bodies
+                    .iter()
+                    .map(|b| b.solution().and_then(|s| SigmaParts::of_answer(s, &b.edges)))
+                    .collect(),
                 edges: edge_cells(&frame_view, outcome),
             };
             self.rows.set_current(frame_view.index, processed);
