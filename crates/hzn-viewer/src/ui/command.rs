@@ -89,6 +89,8 @@ pub enum Command {
     Stages,
     /// Shows or hides the plots.
     Plots,
+    /// Shows or hides the view from space.
+    Space,
     /// Switches between dark and light colours.
     Theme,
     /// Finds a command or a key of sensor.toml by its name.
@@ -141,6 +143,7 @@ pub(super) const ALL: &[(Command, &str, Modifiers, Key)] = &[
     (Command::Answer, "Answer panel", Modifiers::NONE, Key::A),
     (Command::Stages, "Stages panel", Modifiers::NONE, Key::S),
     (Command::Plots, "Plots panel", Modifiers::NONE, Key::P),
+    (Command::Space, "View from space", Modifiers::NONE, Key::V),
     (Command::Theme, "Dark or light theme", Modifiers::NONE, Key::D),
     (Command::Palette, "Find a command or a key…", Modifiers::COMMAND, Key::P),
     (Command::Help, "This help", Modifiers::NONE, Key::F1),

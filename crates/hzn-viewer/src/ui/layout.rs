@@ -6,8 +6,8 @@ use super::command::Command;
 use super::panels::Panel;
 use super::viewer::Viewer;
 use super::{
-    calibration, command, compare, dialogs, help, live, number, palette, picture, plots, questions, rig, side, stages,
-    study, theme, timeline, toasts, top, wizard,
+    calibration, command, compare, dialogs, help, live, number, palette, picture, plots, questions, rig, side,
+    space_view, stages, study, theme, timeline, toasts, top, wizard,
 };
 
 impl Viewer {
@@ -77,6 +77,7 @@ impl Viewer {
         questions::show(self, ctx);
         wizard::show(self, ctx);
         study::show(self, ctx, rect);
+        space_view::show(self, ctx, rect);
         calibration::show(self, ctx, rect);
         help::show(self, ctx);
         palette::show(self, ctx);

@@ -3,6 +3,7 @@
 use egui::Vec2;
 
 use super::plot_cursor::PlotCursor;
+use super::space_eye::SpaceEye;
 use crate::model::Settings;
 
 /// Width in points below which the stages lie over the picture.
@@ -33,6 +34,8 @@ pub(super) struct Panels {
     pub(super) plots_dragged: bool,
     /// The line in the plots that marks the shown picture.
     pub(super) cursor: PlotCursor,
+    /// The view from space, while it is open.
+    pub(super) space: Option<SpaceEye>,
 }
 
 impl Default for Panels {
@@ -45,6 +48,7 @@ impl Default for Panels {
             grown: 0,
             plots_dragged: false,
             cursor: PlotCursor::default(),
+            space: None,
         }
     }
 }
@@ -87,6 +91,10 @@ impl Panels {
             (Panel::Stages, false) => &mut settings.stages,
         };
         *shown = !*shown;
+    }
+    /// Shows or hides the view from space.
+    pub(super) fn toggle_space(&mut self) {
+        self.space = if self.space.is_none() { Some(SpaceEye::default()) } else { None };
     }
     /// Shows a panel.
     pub(super) fn open(&mut self, panel: Panel, settings: &mut Settings) {

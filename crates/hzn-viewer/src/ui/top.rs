@@ -170,6 +170,8 @@ fn frames_menu(viewer: &mut Viewer, ui: &mut Ui) {
         menu_entry(viewer, ui, c, has_frames);
     }
     ui.separator();
+    menu_entry(viewer, ui, Command::Space, has_frames);
+    ui.separator();
     menu_entry(viewer, ui, Command::ProcessAll, has_sensor && has_frames && viewer.sweep.is_none());
     menu_entry(viewer, ui, Command::Rerun, has_sensor && has_frames && viewer.sweep.is_none());
 }

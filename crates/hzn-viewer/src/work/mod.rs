@@ -26,6 +26,7 @@ pub mod residuals;
 pub mod rig;
 mod sequence_source;
 pub mod sky;
+pub mod space;
 pub mod stars;
 pub mod store;
 pub mod study;

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use egui::{Key, Role};
 use egui_kittest::kittest::Queryable;
 use hzn_sim::flight::rocket;
 use hzn_viewer::model::settings::Layer;
@@ -54,4 +55,32 @@ fn pictures_without_positions_have_no_grid() {
     let window = window_on(&pictures);
     assert!(window.query_by_label("Latitude, longitude").is_none());
     assert!(window.state().frame_view().unwrap().grid().is_none());
+}
+
+#[test]
+fn the_view_from_space_opens_and_says_what_it_lacks() {
+    for (has_attitude, words) in [(true, "Cone: half-angle; narrow cone: 3σ"), (false, "There is no attitude (qw")] {
+        let dir = tempfile::tempdir().unwrap();
+        write(dir.path(), has_attitude);
+        let mut window = window_on(dir.path());
+        window.get_by_label("Pictures").click();
+        window.run_steps(3);
+        window.get_by_label_contains("View from space").click();
+        window.run_steps(8);
+        let scene = window.get_by_label("Scene in space").rect();
+        let picture = window.query_all_by_label_contains("Picture ").next().unwrap().rect();
+        assert!(picture.contains_rect(scene) && scene.width() > 200.0, "{scene:?} {picture:?}");
+        assert!(window.query_by_label_contains(words).is_some(), "{words}");
+        window.key_press(Key::V);
+        window.run_steps(3);
+        assert!(window.query_by_label("Scene in space").is_none(), "the key closes it");
+    }
+    let (_dir, pictures) = folder();
+    let mut window = window_on(&pictures);
+    window.key_press(Key::V);
+    window.run_steps(6);
+    assert!(window.query_by_label_contains("There is no position (x_km").is_some());
+    window.key_press(Key::Escape);
+    window.run_steps(3);
+    assert!(window.query_by_role_and_label(Role::Window, "View from space").is_none());
 }

@@ -1,52 +1,19 @@
 //! All heads on one sphere of directions around the vehicle: the border of each picture, the limb that each head found,
 //! and the joint axis.
 
-use egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Shape, Stroke, Ui, vec2};
+use egui::{Align2, FontId, Sense, Stroke, Ui, vec2};
 use hzn_core::camera::Camera;
 use hzn_core::frames::{Cam, Rotation, UnitVec3, Vehicle};
 use hzn_core::pixel::ImagePoint;
 
 use super::colours::colour;
+use crate::ui::globe::Globe;
 use crate::ui::rig_view::{RigView, Use};
 use crate::ui::theme;
 
 /// Points on a side of a picture's border, and around a limb.
 const SIDE: u32 = 20;
 const AROUND: u32 = 180;
-
-/// The sphere as it is seen from outside, without perspective.
-struct Globe {
-    centre: Pos2,
-    radius: f32,
-    /// The directions to the right, upwards and to the eye.
-    axes: [[f64; 3]; 3],
-}
-
-impl Globe {
-    fn new(rect: Rect, [azimuth, elevation]: [f32; 2]) -> Self {
-        let ((sin_a, cos_a), (sin_e, cos_e)) = (f64::from(azimuth).sin_cos(), f64::from(elevation).sin_cos());
-        // Many vehicles have z down, so that +z points downwards on the screen.
-        let eye = [cos_e * cos_a, cos_e * sin_a, -sin_e];
-        let right = [sin_a, -cos_a, 0.0];
-        let up = [-sin_e * cos_a, -sin_e * sin_a, -cos_e];
-        let radius = 0.5 * rect.width().min(rect.height()) - 16.0;
-        Self { centre: rect.center(), radius: radius.max(10.0), axes: [right, up, eye] }
-    }
-    /// Returns the place of a direction on the screen, and whether it is on the near side.
-    fn at(&self, d: [f64; 3]) -> (Pos2, bool) {
-        let [x, y, depth] = self.axes.map(|axis| axis.iter().zip(d).map(|(a, b)| a * b).sum::<f64>());
-        (self.centre + vec2(x as f32, -y as f32) * self.radius, depth >= 0.0)
-    }
-    /// Draws a line, which is faint on the far side.
-    fn line(&self, painter: &egui::Painter, line: impl Iterator<Item = [f64; 3]>, width: f32, colour: Color32) {
-        let points: Vec<(Pos2, bool)> = line.map(|d| self.at(d)).collect();
-        for part in points.chunk_by(|a, b| a.1 == b.1) {
-            let is_near = part.first().is_some_and(|p| p.1);
-            let colour = if is_near { colour } else { colour.gamma_multiply(0.35) };
-            painter.add(Shape::line(part.iter().map(|p| p.0).collect(), Stroke::new(width, colour)));
-        }
-    }
-}
 
 pub(super) fn show(view: &mut RigView, ui: &mut Ui) {
     let dark = ui.visuals().dark_mode;
@@ -58,7 +25,7 @@ pub(super) fn show(view: &mut RigView, ui: &mut Ui) {
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Sphere of all heads"));
     let by = response.drag_delta() * 0.01;
     view.eye_rad = [view.eye_rad[0] + by.x, (view.eye_rad[1] + by.y).clamp(-1.5, 1.5)];
-    let globe = Globe::new(response.rect, view.eye_rad);
+    let globe = Globe::downwards(response.rect, view.eye_rad);
     let faint = Stroke::new(1.0, ui.visuals().weak_text_color().gamma_multiply(0.6));
     painter.circle_stroke(globe.centre, globe.radius, faint);
     axes(&globe, &painter, ui);
@@ -68,10 +35,14 @@ pub(super) fn show(view: &mut RigView, ui: &mut Ui) {
         let Some(turn) = Rotation::<Cam, Vehicle, f64>::assume_from_quaternion(q) else { continue };
         let to_vehicle = |d: UnitVec3<Cam, f64>| turn.apply(&d).xyz();
         let colour = colour(n, dark);
-        globe.line(&painter, border(&head.camera).map(to_vehicle), 1.2, colour);
+        let line = |directions: &mut dyn Iterator<Item = UnitVec3<Cam, f64>>| -> Vec<_> {
+            directions.map(|d| globe.at(to_vehicle(d))).collect()
+        };
+        globe.line(&painter, &line(&mut border(&head.camera)), 1.2, colour);
         let Some(solution) = answer.as_ref().and_then(|answer| answer.solution.as_deref()) else { continue };
         let width = if view.used(view.epoch, n) == Use::Used { 2.6 } else { 1.6 };
-        globe.line(&painter, around(solution.axis.xyz(), solution.half_angle_rad).map(to_vehicle), width, colour);
+        let limb = line(&mut around(solution.axis.xyz(), solution.half_angle_rad));
+        globe.line(&painter, &limb, width, colour);
     }
     let joint = epoch.joint.axis_x.zip(epoch.joint.axis_y).zip(epoch.joint.axis_z);
     if let Some(((x, y), z)) = joint {

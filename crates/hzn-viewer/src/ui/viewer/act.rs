@@ -66,6 +66,7 @@ impl Viewer {
             Command::Stages => self.panels.toggle(Panel::Stages, &mut self.settings),
             Command::Answer => self.panels.toggle(Panel::Answer, &mut self.settings),
             Command::Plots => self.panels.toggle(Panel::Plots, &mut self.settings),
+            Command::Space => self.panels.toggle_space(),
             Command::Theme => self.settings.dark = !self.settings.dark,
             Command::Palette => self.toggle_palette(),
             Command::Help => self.showing_help = !self.showing_help,

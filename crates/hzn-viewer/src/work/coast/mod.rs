@@ -25,7 +25,7 @@ pub fn grid(data: &FrameData, body: &body::Config, camera: &Camera<f64>) -> Opti
 }
 
 /// Returns the lines as latitudes and longitudes in degrees.
-fn lines() -> impl Iterator<Item = Vec<[f64; 2]>> {
+pub(super) fn lines() -> impl Iterator<Item = Vec<[f64; 2]>> {
     let mut rest = COAST;
     std::iter::from_fn(move || {
         let (count, after) = rest.split_first_chunk::<2>()?;
