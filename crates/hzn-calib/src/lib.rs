@@ -22,6 +22,7 @@ mod draws;
 mod finish;
 mod ideal;
 pub mod lens_error;
+mod lens_words;
 mod limb_prior;
 pub mod noise;
 mod other_model;

@@ -49,4 +49,5 @@ pub use track::{Sight, Track, TrackRefusal, estimate_track};
 pub use unknowns::{Parameter, Unknowns};
 pub use view::View;
 pub use words::{check_lines, lines, track_lines};
+pub(crate) use write::set;
 pub use write::{Found, FoundMount, Written, into_sensor_toml};

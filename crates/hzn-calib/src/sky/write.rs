@@ -169,7 +169,14 @@ fn replace_file(table: &mut dyn TableLike, camera: &Config) {
 }
 
 /// Sets a key with a comment before it.
-fn set(table: &mut dyn TableLike, section: &str, key: &str, mut value: Value, why: &str, keys: &mut Vec<String>) {
+pub(crate) fn set(
+    table: &mut dyn TableLike,
+    section: &str,
+    key: &str,
+    mut value: Value,
+    why: &str,
+    keys: &mut Vec<String>,
+) {
     keys.push(format!("{section} {key} = {}", value.to_string().trim()));
     match table.get_mut(key) {
         // The value is replaced in place, so that the comments before and after it stay.

@@ -6,7 +6,7 @@ use egui_plot::{HLine, Line, Plot, Points};
 use super::dialogs::escape;
 use super::viewer::Viewer;
 use super::{placement, theme};
-use crate::work::calibration::Measured;
+use crate::work::calibration::{Marks, Measured};
 
 pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context, picture: egui::Rect) {
     let Some(mut window) = viewer.calibration.take() else { return };
@@ -15,11 +15,15 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context, picture: egui::Rect
     }
     let version = viewer.session.as_ref().map(|s| s.version());
     let is_current = version == Some(window.version);
-    let (mut is_open, mut is_applied) = (true, false);
+    let (mut is_open, mut is_applied, mut asks) = (true, false, false);
     let width = 560.0_f32.min(picture.width() - 40.0);
     let height = (picture.height() - 90.0).max(160.0);
-    let frame = egui::Window::new(window.kind.name()).open(&mut is_open).default_pos(placement::beside(picture));
+    let frame = egui::Window::new(window.name).open(&mut is_open).default_pos(placement::beside(picture));
     frame.default_width(width).max_height(height).vscroll(true).show(ctx, |ui| {
+        if let Some(form) = window.form.as_mut().filter(|_| window.running.is_none()) {
+            asks = form.show(ui);
+            ui.separator();
+        }
         match (&window.running, &window.result) {
             (Some(running), _) => {
                 let done = running.done().min(running.total);
@@ -32,6 +36,9 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context, picture: egui::Rect
             (None, None) => {}
         }
     });
+    if asks {
+        viewer.ask_board_pictures();
+    }
     if is_applied
         && let (Some(Ok(measured)), Some(session)) = (&window.result, &mut viewer.session)
         && let Ok(text) = &measured.text
@@ -63,8 +70,14 @@ fn report(ui: &mut Ui, measured: &Measured, is_current: bool) -> bool {
         ui.add(egui::Label::new(small(key).monospace()).wrap());
     }
     ui.add_space(6.0);
-    ui.strong("Limb height of each picture, km");
-    heights(ui, measured);
+    if !measured.heights.is_empty() {
+        ui.strong("Limb height of each picture, km");
+        heights(ui, measured);
+    }
+    if let Some(marks) = &measured.marks {
+        ui.strong(marks.title);
+        plot_marks(ui, marks);
+    }
     ui.add_space(6.0);
     egui::Grid::new("calibrated").num_columns(2).spacing(vec2(8.0, 2.0)).show(ui, |ui| {
         for (name, value) in &measured.lines {
@@ -95,4 +108,19 @@ fn heights(ui: &mut Ui, measured: &Measured) {
         }
     });
     shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Plot of limb heights"));
+}
+
+/// Plots points; those that do not count have another colour.
+fn plot_marks(ui: &mut Ui, marks: &Marks) {
+    let dark = ui.visuals().dark_mode;
+    let plot = Plot::new("calibration marks").height(150.0).allow_scroll(false).allow_drag(false).allow_zoom(false);
+    let shown = plot.include_y(0.0).show(ui, |plot| {
+        for (counts, colour) in [(true, theme::line(0, dark)), (false, theme::line(1, dark))] {
+            let of = marks.points.iter().filter(|(_, c)| *c == counts);
+            let dots: Vec<[f64; 2]> = of.map(|(point, _)| *point).collect();
+            let name = if counts { "counts" } else { "left out" };
+            plot.points(Points::new(name, dots).color(colour).radius(2.0));
+        }
+    });
+    shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Plot of the calibration"));
 }

@@ -1,10 +1,13 @@
 //! The state of the window that calibrates.
 
-use crate::work::calibration::{Calibration, Kind, Measured};
+use super::board_form::BoardForm;
+use crate::work::calibration::{Calibration, Measured};
 
 /// A calibration: in progress, or with its result.
 pub(super) struct CalibrationWindow {
-    pub(super) kind: Kind,
+    pub(super) name: &'static str,
+    /// What is asked before the pictures of a board are chosen.
+    pub(super) form: Option<BoardForm>,
     /// Work in progress; `None` when it has ended.
     pub(super) running: Option<Calibration>,
     /// The result, or why there is none.

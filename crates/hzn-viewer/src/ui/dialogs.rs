@@ -43,7 +43,7 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context, picture: egui::Rect
             ui.separator();
             let idle = path_dialog.browsing.is_none();
             if ui.add_enabled(idle, egui::Button::new("Browse…")).clicked() {
-                path_dialog.browse(false);
+                path_dialog.browse(path_dialog.purpose == Purpose::Boards);
             }
             if path_dialog.purpose == Purpose::Open
                 && ui.add_enabled(idle, egui::Button::new("Browse folders…")).clicked()

@@ -2,6 +2,7 @@
 //! draws.
 
 mod altitude_trial;
+mod board_form;
 mod calibration;
 mod calibration_window;
 mod camera_card;

@@ -18,6 +18,7 @@ pub(super) enum Purpose {
     Table,
     Plots,
     Rerun,
+    Boards,
 }
 
 impl Purpose {
@@ -31,6 +32,7 @@ impl Purpose {
             Self::Table => "Save results",
             Self::Plots => "Save plots",
             Self::Rerun => "Run all pictures into a new recording",
+            Self::Boards => "Pictures of the board",
         }
     }
     pub(super) fn hint(self) -> &'static str {
@@ -45,16 +47,17 @@ impl Purpose {
                 ".svg, or .png with 2700 pixels across: the plots over time that are chosen below the picture"
             }
             Self::Rerun => ".mcap with the current parameters",
+            Self::Boards => "A folder with pictures of a chessboard",
         }
     }
     /// Returns true if the path is written to.
     pub(super) fn writes(self) -> bool {
-        !matches!(self, Self::Open | Self::Compare)
+        !matches!(self, Self::Open | Self::Compare | Self::Boards)
     }
     /// Returns the endings that the file may have; none if every file is possible.
     fn endings(self) -> &'static [&'static str] {
         match self {
-            Self::Open => &[],
+            Self::Open | Self::Boards => &[],
             Self::SaveSensor | Self::Compare => &["toml"],
             Self::Picture => &["png"],
             Self::Video => &["mp4", "mkv", "webm", "mov", "avi"],

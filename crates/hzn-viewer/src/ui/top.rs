@@ -8,6 +8,7 @@ use super::panels::Panel;
 use super::path_dialog::{PathDialog, Purpose};
 use super::viewer::Viewer;
 use crate::model::autosave::absolute;
+use crate::work::board;
 use crate::work::calibration::Kind;
 
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
@@ -152,6 +153,10 @@ fn edit_menu(viewer: &mut Viewer, ui: &mut Ui) {
             viewer.calibrate(kind);
             ui.close();
         }
+    }
+    if ui.add_enabled(can_calibrate, egui::Button::new(format!("{}…", board::NAME))).clicked() {
+        viewer.ask_board();
+        ui.close();
     }
     ui.separator();
     menu_entry(viewer, ui, Command::Palette, true);

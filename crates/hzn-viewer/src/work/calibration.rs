@@ -14,6 +14,7 @@ use hzn_run::engine::{self, Finished, Plan, Turns};
 use hzn_run::explain::counted;
 
 use super::Wake;
+use super::board;
 use super::sequence_source::SequenceSource;
 use super::sky as sky_places;
 use crate::model::Sequence;
@@ -76,6 +77,28 @@ pub struct Measured {
     pub heights: Vec<HeightOf>,
     /// The limb height of all pictures, km.
     pub height_km: f64,
+    /// What else a plot shows.
+    pub marks: Option<Marks>,
+}
+
+/// Points of a plot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Marks {
+    /// The title of the plot.
+    pub title: &'static str,
+    /// The points, and whether each of them counts.
+    pub points: Vec<([f64; 2], bool)>,
+}
+
+/// How far a calibration is, and whether it is to stop.
+#[derive(Clone)]
+pub struct Steps {
+    /// True if nobody waits for the result any more.
+    pub stop: Arc<AtomicBool>,
+    /// Number of pictures that are processed.
+    pub done: Arc<AtomicU64>,
+    /// Wakes the window.
+    pub wake: Wake,
 }
 
 /// A calibration in progress. It stops when the handle is dropped.
@@ -91,18 +114,24 @@ pub struct Calibration {
 impl Calibration {
     /// Starts a calibration.
     pub fn start(task: Task, wake: Wake) -> Self {
+        let total = task.sequence.len() as u64;
+        Self::begin(total, wake, move |steps| Run { task, steps, copies: RefCell::default() }.run())
+    }
+    /// Starts a calibration from pictures of a board.
+    pub fn start_board(task: board::Task, wake: Wake) -> Self {
+        let total = std::fs::read_dir(&task.folder).map_or(0, |files| files.count() as u64);
+        Self::begin(total, wake, move |steps| task.run(&steps))
+    }
+    fn begin(
+        total: u64,
+        wake: Wake,
+        run: impl FnOnce(Steps) -> Result<Option<Measured>, String> + Send + 'static,
+    ) -> Self {
         let (send, end) = bounded(1);
         let (stop, done) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
-        let total = task.sequence.len() as u64;
-        let run = Run {
-            task,
-            stop: Arc::clone(&stop),
-            done: Arc::clone(&done),
-            wake: Arc::clone(&wake),
-            copies: RefCell::default(),
-        };
+        let steps = Steps { stop: Arc::clone(&stop), done: Arc::clone(&done), wake: Arc::clone(&wake) };
         std::thread::spawn(move || {
-            if let Some(measured) = run.run().transpose() {
+            if let Some(measured) = run(steps).transpose() {
                 let _ = send.send(measured);
             }
             wake();
@@ -127,9 +156,7 @@ impl Drop for Calibration {
 
 struct Run {
     task: Task,
-    stop: Arc<AtomicBool>,
-    done: Arc<AtomicU64>,
-    wake: Wake,
+    steps: Steps,
     /// Which pictures were left out as copies of others, in words.
     copies: RefCell<Option<String>>,
 }
@@ -181,12 +208,12 @@ impl Run {
             turns: Turns::default(),
         };
         let mut source = SequenceSource::new(self.task.sequence.clone())?;
-        self.done.store(0, Ordering::Relaxed);
+        self.steps.done.store(0, Ordering::Relaxed);
         let seen = |_: &Finished| {
-            self.done.fetch_add(1, Ordering::Relaxed);
-            (self.wake)();
+            self.steps.done.fetch_add(1, Ordering::Relaxed);
+            (self.steps.wake)();
         };
-        let measured = engine::measure_answers(&plan, &mut source, &self.stop, seen, measure);
+        let measured = engine::measure_answers(&plan, &mut source, &self.steps.stop, seen, measure);
         let Some(measured) = measured.map_err(|e| format!("{e:#}"))? else { return Ok(None) };
         *self.copies.borrow_mut() = measured.copies_in_words();
         Ok(Some(measured.answers))
@@ -208,6 +235,7 @@ impl Run {
             text: found.alarm().map_or(Ok(written.text), |why| Err(why.to_string())),
             heights: found.pictures.iter().map(height).collect(),
             height_km: found.height.km,
+            marks: None,
         }))
     }
 
@@ -231,6 +259,7 @@ impl Run {
         let lens = sky::Found { camera: &estimate.camera, parameters: &estimate.parameters, source: &source };
         let written = sky::into_sensor_toml(&self.task.sensor_toml, lens)?;
         let doubt = estimate.alarm().or_else(|| estimate.undetermined());
+        let rms = (1..).zip(&estimate.pictures).map(|(n, p)| ([f64::from(n), p.rms_px], p.counts)).collect();
         let height = |p: &sky::Picture| HeightOf { km: p.km, sigma_km: p.sigma_km, counts: p.counts };
         Ok(Some(Measured {
             lines: self.lines(sky::lines(&estimate, &self.pictures(), None)),
@@ -238,6 +267,7 @@ impl Run {
             text: doubt.map_or(Ok(written.text), |why| Err(why.to_string())),
             heights: estimate.pictures.iter().map(height).collect(),
             height_km: estimate.height_km[0],
+            marks: Some(Marks { title: "RMS of each picture with the new lens, px", points: rms }),
         }))
     }
 }

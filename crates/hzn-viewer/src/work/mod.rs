@@ -3,6 +3,7 @@
 #[cfg(test)]
 mod answers;
 pub mod background;
+pub mod board;
 pub mod calibration;
 mod canvas;
 pub mod check;

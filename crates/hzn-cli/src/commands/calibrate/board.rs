@@ -73,7 +73,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Ok(Exit::Interrupted);
     };
     pictures.reasons.iter().for_each(|(name, why)| tell::warning(format_args!("{name}: {why}")));
-    pictures.notes.iter().for_each(tell::warning);
+    board_search::note_of_parts(&pictures, &board).iter().for_each(tell::warning);
     let name = args.input.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" ");
     let calibrated = board::calibrate(args.model, pictures.size_px, &board, &pictures.views)
         .map_err(|why| failed(format!("no camera is written: {why}")))?;

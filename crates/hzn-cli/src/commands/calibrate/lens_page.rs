@@ -26,7 +26,7 @@ th{text-align:left;padding:.2rem .8rem;border-bottom:2px solid #ccc}.number{text
 /// Returns the page. `reasons` says why pictures were left out before the fit.
 pub(super) fn html(calibrated: &Calibrated, reasons: &Reasons, pictures: &str) -> anyhow::Result<String> {
     let row = |(name, value): &(String, String)| format!("<tr><td>{name}</td><td>{}</td></tr>", escape(value));
-    let lens: String = lens_text::lines(calibrated).iter().map(row).collect();
+    let lens: String = calibrated.lines().iter().map(row).collect();
     let views: String = calibrated.views.iter().map(|view| view_row(view, reasons)).collect();
     let warnings: String =
         calibrated.warnings.iter().map(|w| format!("<p class=\"warning\">{}</p>", escape(&w.to_string()))).collect();

@@ -10,8 +10,11 @@ use hzn_files::truth::Truth;
 use super::Viewer;
 use super::changes::Leave;
 use crate::model::{Place, Session, autosave};
+use crate::ui::board_form::BoardForm;
 use crate::ui::calibration_window::CalibrationWindow;
+use crate::ui::path_dialog::{PathDialog, Purpose};
 use crate::ui::wizard_form::Wizard;
+use crate::work::board;
 use crate::work::calibration::{self, Calibration, Kind};
 use crate::work::demo;
 use crate::work::open::Request;
@@ -56,7 +59,41 @@ impl Viewer {
         let task =
             calibration::Task { kind, sequence: self.sequence.clone(), config, sensor_toml, flight: self.flight };
         let running = Some(Calibration::start(task, Arc::clone(&self.wake)));
-        self.calibration = Some(CalibrationWindow { kind, running, result: None, version });
+        self.calibration = Some(CalibrationWindow { name: kind.name(), form: None, running, result: None, version });
+    }
+
+    /// Asks for the board whose pictures calibrate the lens.
+    pub(in crate::ui) fn ask_board(&mut self) {
+        let Some(session) = &self.session else { return self.add_note("Open a sensor.toml first.") };
+        let (Some(config), None) = (session.config(), session.problem()) else {
+            return self.add_note("The sensor.toml has an error; mend it first.");
+        };
+        let (form, version) = (Some(BoardForm::new(config.camera.model)), session.version());
+        self.calibration = Some(CalibrationWindow { name: board::NAME, form, running: None, result: None, version });
+    }
+
+    /// Asks for the folder with the pictures of the board.
+    pub(in crate::ui) fn ask_board_pictures(&mut self) {
+        let mut dialog = PathDialog::new(Purpose::Boards, &self.sequence.folder);
+        if self.native_dialogs {
+            dialog.browse_only(true);
+        }
+        self.path_dialog = Some(dialog);
+    }
+
+    /// Calibrates the lens from the pictures in a folder.
+    pub(in crate::ui) fn calibrate_board(&mut self, folder: PathBuf) {
+        let (Some(window), Some(session)) = (&mut self.calibration, &self.session) else { return };
+        let (Some(form), Some(config)) = (window.form, session.config()) else { return };
+        let task = board::Task {
+            folder,
+            board: form.board(),
+            model: form.model,
+            camera: config.camera.clone(),
+            sensor_toml: session.sheet().text().to_owned(),
+        };
+        (window.version, window.result) = (session.version(), None);
+        window.running = Some(Calibration::start_board(task, Arc::clone(&self.wake)));
     }
 
     /// Returns the folder of the demo flight: next to the settings, or in the folder for temporary files.

@@ -130,6 +130,7 @@ impl Viewer {
             Purpose::Table => self.export_table(path),
             Purpose::Plots => self.export_plots(path),
             Purpose::Rerun => self.run_into(path),
+            Purpose::Boards => self.calibrate_board(path),
         }
     }
 
