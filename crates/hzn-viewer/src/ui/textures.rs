@@ -1,17 +1,35 @@
 //! Textures of the pictures on the graphics card.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
-use egui::{ColorImage, TextureFilter, TextureHandle, TextureOptions};
+use egui::{ColorImage, TextureFilter, TextureHandle, TextureId, TextureOptions};
+use image::RgbImage;
 
 use crate::work::FrameView;
 use crate::work::frame_view::Shown;
+use crate::work::thumbnails::Thumbnails;
 
 /// Textures of the pictures on the graphics card.
 #[derive(Default)]
 pub(super) struct Textures {
     pub(super) shown: Option<(Arc<Shown>, TextureHandle)>,
     pub(super) touched: Option<(Arc<ColorImage>, TextureHandle)>,
+    /// Small pictures of the page of an empty window.
+    pub(super) thumbnails: Thumbnails,
+    pub(super) small: HashMap<String, TextureHandle>,
+}
+
+impl Textures {
+    /// Returns the texture of a small picture, by its name.
+    pub(super) fn small(&mut self, name: &str, ctx: &egui::Context, picture: impl FnOnce() -> RgbImage) -> TextureId {
+        let upload = || {
+            let picture = picture();
+            let size = [picture.width() as usize, picture.height() as usize];
+            ctx.load_texture(name, ColorImage::from_rgb(size, picture.as_raw()), TextureOptions::LINEAR)
+        };
+        self.small.entry(name.to_owned()).or_insert_with(upload).id()
+    }
 }
 
 impl Textures {

@@ -33,6 +33,7 @@ pub mod store;
 pub mod study;
 mod summary;
 pub mod sweep;
+pub mod thumbnails;
 pub mod trials;
 
 pub use engine::{Engine, FrameRequest, Setup};

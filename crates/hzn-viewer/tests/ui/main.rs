@@ -16,5 +16,6 @@ mod rig;
 mod small;
 mod steady;
 mod tune;
+mod welcome;
 mod window;
 mod wrong;

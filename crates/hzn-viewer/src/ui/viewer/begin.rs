@@ -16,9 +16,10 @@ use crate::ui::path_dialog::{PathDialog, Purpose};
 use crate::ui::wizard_form::Wizard;
 use crate::work::board;
 use crate::work::calibration::{self, Calibration, Kind};
-use crate::work::demo;
+use crate::work::demo::{self, Sample};
 use crate::work::open::Request;
 use crate::work::study::{Study, Task};
+use crate::work::thumbnails::Thumbnail;
 
 impl Viewer {
     /// Opens the form for a first sensor.toml, for the shown picture.
@@ -96,20 +97,30 @@ impl Viewer {
         window.running = Some(Calibration::start_board(task, Arc::clone(&self.wake)));
     }
 
-    /// Returns the folder of the demo flight: next to the settings, or in the folder for temporary files.
-    fn demo_folder(&self) -> PathBuf {
-        let folder = self.store.as_deref().and_then(Path::parent).map(Path::to_owned);
-        folder.unwrap_or_else(|| std::env::temp_dir().join("hzn")).join("demo-flight")
+    /// Returns the folder of the settings, if they are kept.
+    pub(in crate::ui) fn settings_folder(&self) -> Option<PathBuf> {
+        self.store.as_deref().and_then(Path::parent).map(Path::to_owned)
     }
 
-    /// Opens the demo flight. Its pictures are rendered the first time.
-    pub(in crate::ui) fn open_demo(&mut self) {
-        let folder = self.demo_folder();
+    /// Returns the small picture of a file or folder.
+    pub(in crate::ui) fn thumbnail(&mut self, path: &Path) -> Thumbnail {
+        let kept = self.settings_folder().map(|folder| folder.join("thumbnails"));
+        self.textures.thumbnails.of(path, kept.as_deref(), &self.wake)
+    }
+
+    /// Returns the folder of a sample: next to the settings, or in the folder for temporary files.
+    fn sample_folder(&self, sample: Sample) -> PathBuf {
+        self.settings_folder().unwrap_or_else(|| std::env::temp_dir().join("hzn")).join(sample.folder())
+    }
+
+    /// Opens a sample. Its pictures are rendered the first time.
+    pub(in crate::ui) fn open_sample(&mut self, sample: Sample) {
+        let folder = self.sample_folder(sample);
         if demo::is_complete(&folder) {
             let request = Request { inputs: vec![folder], fps: self.request.fps, ..Request::default() };
             self.leave(Leave::Sequence(Box::new(request)), None);
         } else {
-            self.start_job("Rendering the demo flight", move |progress| demo::render(&folder, progress));
+            self.start_job("Rendering the sample", move |progress| demo::render(sample, &folder, progress));
         }
     }
 
