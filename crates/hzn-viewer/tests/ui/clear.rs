@@ -120,6 +120,20 @@ fn the_text_at_the_foot_of_the_picture_lies_over_nothing() {
     }
 }
 
+#[test]
+fn an_axis_outside_of_the_picture_has_a_small_map() {
+    let is_map = |text: &str| text.ends_with("° around the optical axis");
+    let (_dir, window) = window_on_flight();
+    let picture = window.get_by_label("Picture 0.png").rect();
+    let foot = place_of(&window, is_map);
+    assert!(picture.contains_rect(foot) && foot.center().x > picture.center().x, "{foot:?}");
+    let dir = tempfile::tempdir().unwrap();
+    disc(dir.path());
+    let window = window_on(dir.path());
+    assert_eq!(answer(&window).0, Status::Ok);
+    assert!(!painted(&window).iter().any(|(text, _)| is_map(text)), "its axis is in the picture");
+}
+
 const LAST_LINE: &str = "Pictures whose status differs";
 
 /// Checks that the last line of a comparison is not cut where it is painted.

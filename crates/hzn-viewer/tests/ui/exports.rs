@@ -3,6 +3,7 @@
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use hzn_core::status::Status;
+use hzn_viewer::model::settings::Layer;
 
 use crate::window::*;
 
@@ -57,6 +58,51 @@ fn the_picture_is_saved_as_it_is_shown() {
     assert_eq!(files(dir.path()), ["pictures", "plain.png", "shown.png"]);
 }
 
+/// Returns how many pixels around a point are redder than blue (positive sign) or bluer than red. The picture is grey.
+fn coloured_near(picture: &image::RgbImage, [u, v]: [u32; 2], reach: u32, sign: i32) -> usize {
+    let part = image::imageops::crop_imm(picture, u - reach, v - reach, 2 * reach, 2 * reach).to_image();
+    part.pixels().filter(|p| sign * (i32::from(p[0]) - i32::from(p[2])) > 8).count()
+}
+
+#[test]
+fn the_saved_picture_has_axis_sun_and_mask() {
+    let (dir, pictures) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    disc(pictures.path());
+    let sensor = std::fs::read_to_string(pictures.path().join("sensor.toml")).unwrap();
+    let mask = "\n[mask]\npolygons_px = [[[4.0, 4.0], [60.0, 4.0], [60.0, 40.0], [4.0, 40.0]]]\n";
+    std::fs::write(pictures.path().join("sensor.toml"), sensor + mask).unwrap();
+    // The Sun is beside the Earth, at the left. The sensor is not told, because it would miss the night on the Earth.
+    let header = "file,time_s,body,limb,axis_x,axis_y,axis_z,half_angle_deg,altitude_km,sun_x,sun_y,sun_z,qw,qx,qy,qz";
+    let row = "disc.png,0,earth-sphere,1,0.0998,0,0.995,15,18283,-0.447,0.179,0.876,1,0,0,0";
+    std::fs::write(pictures.path().join("truth.csv"), format!("{header}\n{row}\n")).unwrap();
+    let mut window = window_on(pictures.path());
+    assert_eq!(answer(&window).0, Status::Ok);
+    let save = |window: &mut Window, name: &str| {
+        let png = dir.path().join(name);
+        window.key_press_modifiers(Modifiers::COMMAND, Key::E);
+        path(window, &png, "Write");
+        said(window, name);
+        let saved = image::open(&png).unwrap().to_rgb8();
+        // The caption has a legend with these colours.
+        image::imageops::crop_imm(&saved, 0, 0, WIDTH.into(), HEIGHT.into()).to_image()
+    };
+    // Where each part is drawn: an edge of the mask is bluish, the Sun yellow, the axis pink.
+    let parts = [("mask", [40, 40], 30, -1), ("Sun", [27, 173], 20, 1), ("axis", [186, 120], 12, 1)];
+    let with = save(&mut window, "with.png");
+    for (part, at, reach, sign) in parts {
+        let count = coloured_near(&with, at, reach, sign);
+        assert!(count >= 20, "{part}: {count}");
+    }
+    for layer in [Layer::Mask, Layer::Sky, Layer::Axis] {
+        window.state_mut().settings_mut().show(layer, false);
+    }
+    window.run_steps(2);
+    let without = save(&mut window, "without.png");
+    for (part, at, reach, sign) in parts {
+        assert_eq!(coloured_near(&without, at, reach, sign), 0, "{part}");
+    }
+}
+
 #[test]
 fn the_table_holds_what_is_shown() {
     let (dir, pictures) = folder();
@@ -84,6 +130,9 @@ fn the_plots_are_saved_as_they_are_chosen() {
     let text = std::fs::read_to_string(&svg).unwrap();
     assert!(text.contains("3 sigma [°]") && text.contains("RMS [px]") && !text.contains("Half-angle"), "{text}");
     assert!(text.contains("pictures, 4 pictures") && text.contains("<polyline"), "{text}");
+    // The last line says where the plots come from.
+    let version = format!("hzn {}, ", env!("CARGO_PKG_VERSION"));
+    assert!(text.contains(&version) && text.contains(", sensor ") && text.contains(", hzn view"), "{text}");
 
     menu(&mut window, "Export", "Save plots as SVG…");
     path(&mut window, &dir.path().join("flight.pdf"), "Write");

@@ -138,29 +138,6 @@ fn many_plots_keep_their_time_axis_within_the_window() {
 }
 
 #[test]
-fn the_panel_grows_for_a_new_plot_and_shows_it() {
-    let (_dir, pictures) = folder();
-    let mut window = window();
-    window.state_mut().settings_mut().plots_height = 120.0;
-    window.state_mut().settings_mut().plotted.clear();
-    open(&mut window, &pictures);
-    settled(&mut window);
-    window.run_steps(4);
-    let before = window.state_mut().settings_mut().plots_height;
-    for (n, name) in ["3 sigma", "Points", "Half-angle", "Processing"].into_iter().enumerate() {
-        window.get_by_label(name).click();
-        window.run_steps(30);
-        let choice = window.get_by_label("3 sigma").rect().bottom();
-        let axis = window.get_by_label("Plot time axis").rect();
-        let new = window.get_by_label(&format!("Plot {name}")).rect();
-        assert!(new.top() > choice && new.bottom() <= axis.top() + 1.0, "{name} is scrolled away: {new:?} {axis:?}");
-        let first = window.get_by_label("Plot 3 sigma").rect();
-        assert!(n > 1 || first.top() > choice, "two plots have room in a quarter of the window: {first:?}");
-    }
-    assert!(window.state_mut().settings_mut().plots_height > before + 50.0);
-}
-
-#[test]
 fn a_folder_without_times_has_no_invented_seconds() {
     let (_dir, mut window) = window_on_flight();
     assert!(window.state().sequence().entries.iter().all(|e| e.time_s.is_none()));

@@ -58,6 +58,23 @@ pub(crate) fn flight(folder: &Path) {
     std::fs::write(folder.join("sensor.toml"), SENSOR).unwrap();
 }
 
+/// Altitude in km at which the Earth of [`disc`] has a half-angle of 15 degrees, with the limb 10 km above the ground.
+const DISC_ALTITUDE: &str = "altitude_km = 18282.9";
+
+/// Writes a picture of the whole Earth, whose axis is in the picture, and its sensor.
+pub(crate) fn disc(folder: &Path) {
+    let camera = Camera::<f64>::try_new(&Config::ideal(Model::Pinhole, WIDTH, HEIGHT, 260.0)).unwrap();
+    let axis = [0.1f64.sin(), 0.0, 0.1f64.cos()];
+    let picture = image::GrayImage::from_fn(WIDTH.into(), HEIGHT.into(), |x, y| {
+        let ray = camera.unproject(ImagePoint { u: x.into(), v: y.into() }).unwrap().xyz();
+        let cos: f64 = ray.iter().zip(axis).map(|(a, b)| a * b).sum();
+        let inside_px = (15f64.to_radians() - cos.clamp(-1.0, 1.0).acos()) * 260.0;
+        image::Luma([(8.0 + 190.0 / (1.0 + (-inside_px / 0.6).exp())) as u8])
+    });
+    picture.save(folder.join("disc.png")).unwrap();
+    std::fs::write(folder.join("sensor.toml"), SENSOR.replace("altitude_km = 240.0", DISC_ALTITUDE)).unwrap();
+}
+
 /// Creates a folder that contains a folder of pictures, so that written files go next to the pictures.
 pub(crate) fn folder() -> (TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
