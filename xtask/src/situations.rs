@@ -26,7 +26,7 @@ const fn shot(name: &'static str, open: &'static str, frame: &'static str, situa
     Shot { name, open: Some(open), frame, situation }
 }
 
-const SHOTS: [Shot; 14] = [
+const SHOTS: [Shot; 16] = [
     Shot { name: "welcome", open: None, frame: "0", situation: None },
     shot("ok", "rocket.mcap", "5", None),
     shot("refused", "discs", "1", Some("stages")),
@@ -41,6 +41,8 @@ const SHOTS: [Shot; 14] = [
     shot("palette", "rocket.mcap", "5", Some("palette")),
     shot("steady", "unmasked", "5", Some("stages")),
     shot("rig", "ring/rig.toml", "0", None),
+    shot("space", "rocket", "5", Some("space")),
+    shot("sigmas", "rocket", "5", Some("sigmas")),
 ];
 
 /// Makes all pictures in target/xtask/situations.

@@ -33,6 +33,10 @@ pub enum Situation {
     Replace,
     /// Another program changed the sensor.toml that is saved.
     Changed,
+    /// The view from space is open.
+    Space,
+    /// The sources of sigma, and errors over their sigmas, are plotted.
+    Sigmas,
 }
 
 impl Viewer {
@@ -64,6 +68,11 @@ impl Viewer {
                 let dialog = |s: &Session| PathDialog::new(Purpose::SaveSensor, s.home());
                 self.path_dialog = self.session.as_ref().map(dialog);
                 self.accept_path();
+            }
+            Situation::Space => self.run(Command::Space, ctx),
+            Situation::Sigmas => {
+                self.settings.plotted = ["σ budget", "Error over σ (truth)"].map(str::to_owned).to_vec();
+                self.panels.open(Panel::Plots, &mut self.settings);
             }
             Situation::Changed => self.changes.of_file = Some(FileChange::Changed),
         }

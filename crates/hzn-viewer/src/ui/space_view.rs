@@ -54,7 +54,7 @@ fn contents(viewer: &Viewer, ui: &mut Ui, eye: &mut SpaceEye) {
     eye.turn(at, response.drag_delta());
     if response.contains_pointer() {
         let (zoom, scroll) = ui.input(|i| (i.zoom_delta(), i.smooth_scroll_delta.y));
-        eye.scale(zoom * (0.004 * scroll).exp());
+        eye.scale(eye.zoom(scene.reach, scene.sight), zoom * (0.004 * scroll).exp());
     }
     if response.double_clicked() {
         *eye = SpaceEye::default();
@@ -73,9 +73,15 @@ fn contents(viewer: &Viewer, ui: &mut Ui, eye: &mut SpaceEye) {
 fn draw(painter: &Painter, rect: Rect, scene: &Scene, eye: SpaceEye) {
     let painter = painter.with_clip_rect(rect);
     let mut globe = Globe::upwards(rect, eye.beside(scene.camera));
-    globe.radius *= eye.zoom;
     let ball = scene.globe.map_or(0.0, |radius| radius / scene.reach);
     let scaled = |p: [f64; 3]| p.map(|x| x / scene.reach);
+    let zoom = eye.zoom(scene.reach, scene.sight);
+    globe.radius *= zoom;
+    if let Some(camera) = scene.camera.filter(|_| zoom > 1.0) {
+        // The more the scene is enlarged, the nearer the camera is to the middle.
+        let (at, _) = globe.place(scaled(camera));
+        globe.centre -= (at - globe.centre) * (zoom - 1.0).min(1.0);
+    }
     if scene.globe.is_some() {
         let stroke = Stroke::new(1.0, theme::GRID.gamma_multiply(0.5));
         painter.circle(globe.centre, globe.radius * ball as f32, Color32::from_rgb(24, 36, 54), stroke);
@@ -90,6 +96,8 @@ fn draw(painter: &Painter, rect: Rect, scene: &Scene, eye: SpaceEye) {
             Kind::Axis => (2.0, theme::AXIS),
             Kind::Sigma => (1.2, theme::AXIS),
         };
+        // The axis ends within the globe. It is drawn as if the globe were of glass.
+        let ball = if matches!(line.kind, Kind::Axis | Kind::Sigma) { 0.0 } else { ball };
         let points: Vec<_> = line.points.iter().map(|p| globe.beyond(scaled(*p), ball)).collect();
         // The far side of the ground would be confused with the near one.
         let is_ground = matches!(line.kind, Kind::Grid | Kind::Coast);

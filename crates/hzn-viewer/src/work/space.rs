@@ -58,6 +58,8 @@ pub struct Scene {
     pub globe: Option<f64>,
     /// Distance of the farthest point from the middle.
     pub reach: f64,
+    /// How far the cone is drawn: the distance of the limb.
+    pub sight: f64,
     /// By how much the cone of 3 sigma is drawn larger.
     pub sigma_times: f64,
     /// What the view lacks, in words.
@@ -75,8 +77,15 @@ pub fn scene(
 ) -> Scene {
     let position = data.and_then(|d| d.position_km);
     let attitude = data.and_then(|d| Rotation::<Cam, Fixed, f64>::assume_from_quaternion(d.q_fixed_from_camera_wxyz?));
-    let mut scene =
-        Scene { lines: Vec::new(), camera: position, globe: None, reach: 1.0, sigma_times: 1.0, missing: None };
+    let mut scene = Scene {
+        lines: Vec::new(),
+        camera: position,
+        globe: None,
+        reach: 1.0,
+        sight: 1.0,
+        sigma_times: 1.0,
+        missing: None,
+    };
     let Some((p, figure_km)) = position.zip(figure_km) else {
         scene.missing = Some("There is no position (x_km, y_km, z_km in frames.csv): this is the view of the camera.");
         scene.camera = Some([0.0; 3]);
@@ -93,9 +102,11 @@ pub fn scene(
         Some(turn) => {
             let far = (length(p).powi(2) - radius * radius).max(0.0).sqrt();
             let turned = |d: [f64; 3]| UnitVec3::try_new(d).map_or(d, |d| turn.apply(&d).xyz());
-            scene.add_camera(p, far.max(0.02 * radius), camera, solution, turned);
+            scene.sight = far.max(0.02 * radius);
+            scene.add_camera(p, scene.sight, camera, solution, turned);
         }
         None => {
+            scene.sight = scene.reach;
             scene.missing =
                 Some("There is no attitude (qw, qx, qy, qz in frames.csv), so the camera's directions are not known.");
         }
