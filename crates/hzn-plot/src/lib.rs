@@ -28,6 +28,9 @@ const MARKS: RGBColor = RGBColor(110, 110, 110);
 const LEGEND_ROW: u32 = 18;
 const LEGEND_LEFT: u32 = 76;
 const LETTER: u32 = 7;
+/// Height of the text below the plot, and an estimate of the width of its letters, in pixels.
+const FOOT: u32 = 18;
+const FOOT_LETTER: u32 = 6;
 
 /// The outcome of drawing onto a text.
 type Drawn = Result<(), DrawingAreaErrorKind<io::Error>>;
@@ -76,18 +79,26 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Width and height in pixels.
     pub size: (u32, u32),
+    /// Small text below the plot, for example what made the chart; empty for none.
+    pub foot: String,
 }
 
 impl Chart {
     /// Makes an empty chart of the usual size.
     pub fn new(title: impl Into<String>, x: impl Into<String>, y: impl Into<String>) -> Self {
         let size = (640, 360);
-        Self { title: title.into(), x: x.into(), y: y.into(), series: Vec::new(), size }
+        Self { title: title.into(), x: x.into(), y: y.into(), series: Vec::new(), size, foot: String::new() }
     }
     /// Changes width and height, in pixels.
     #[must_use]
     pub fn sized(mut self, size: (u32, u32)) -> Self {
         self.size = size;
+        self
+    }
+    /// Writes a small text below the plot. It is cut where it would leave the chart.
+    #[must_use]
+    pub fn with_foot(mut self, foot: impl Into<String>) -> Self {
+        self.foot = foot.into();
         self
     }
     /// Adds a series.
@@ -134,6 +145,12 @@ impl Chart {
         let named: Vec<(&Series, RGBColor)> = self.coloured().filter(|(s, _)| !s.name.is_empty()).collect();
         let places = legend_places(&named, self.size.0);
         let height = places.last().map_or(0, |[_, y]| y + LEGEND_ROW);
+        let (root, foot) = root.split_vertically(self.size.1 - if self.foot.is_empty() { 0 } else { FOOT });
+        if !self.foot.is_empty() {
+            let faint = BLACK.mix(0.6);
+            let style = font(11).into_text_style(&foot).color(&faint);
+            foot.draw_text(&shortened(&self.foot, self.size.0 / FOOT_LETTER), &style, (12, 2))?;
+        }
         let (legend, plot) = root.titled(&self.title, font(17))?.split_vertically(height);
         for ((series, colour), [x, y]) in named.iter().zip(&places) {
             draw_entry(&legend, series, *colour, [*x, *y])?;
@@ -228,6 +245,14 @@ fn draw_entry(
     area.draw(&Text::new(series.name.clone(), (x + 24, middle - 6), ("sans-serif", 12)))
 }
 
+/// Returns a text, cut where it has more letters than fit.
+fn shortened(text: &str, most: u32) -> String {
+    match text.char_indices().nth(most as usize) {
+        Some((at, _)) => text.get(..at).unwrap_or(text).to_owned() + "…",
+        None => text.to_owned(),
+    }
+}
+
 /// Returns whether a point can be drawn.
 fn is_drawable(&(x, y): &(f64, f64)) -> bool {
     x.is_finite() && y.is_finite()
@@ -289,6 +314,19 @@ mod tests {
             let names = svg.lines().filter(|line| line.starts_with("series ")).count();
             assert_eq!(names, count as usize, "every name is listed: {svg}");
         }
+    }
+
+    #[test]
+    fn a_foot_stands_below_the_plot_and_is_cut_at_the_border() {
+        let chart = Chart::new("t", "x", "y").with_series(Series::new("s", Style::Dots, [(0.0, 0.0), (1.0, 1.0)]));
+        let svg = chart.clone().with_foot("hzn 0.1.0, hzn sensitivity").svg().unwrap();
+        let lines: Vec<&str> = svg.lines().collect();
+        let at = lines.iter().position(|line| *line == "hzn 0.1.0, hzn sensitivity").unwrap();
+        assert!(value(lines[at - 1], "y") > 340.0, "{}", lines[at - 1]);
+        let lowest = lines.iter().filter(|l| l.starts_with("<circle")).map(|l| value(l, "cy")).fold(0.0, f64::max);
+        assert!(lowest < 342.0 && !chart.svg().unwrap().contains("hzn"));
+        let long = chart.with_foot("x".repeat(500)).svg().unwrap();
+        assert!(long.contains(&format!("{}…", "x".repeat(106))) && !long.contains(&"x".repeat(107)));
     }
 
     #[test]

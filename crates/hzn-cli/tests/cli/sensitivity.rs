@@ -183,6 +183,9 @@ fn charts_of_visibility_and_of_the_spherical_earth() {
     assert!((from - 118.3).abs() < 0.1);
     place.run(&["sensitivity", "visibility", "-o", "v.svg"]).expect(0);
     assert!(place.read("v.svg").contains("arc of a hyperbola"));
+    // The chart says what made it.
+    let foot = format!("hzn {}, hzn sensitivity visibility -o v.svg", env!("CARGO_PKG_VERSION"));
+    assert!(place.read("v.svg").contains(&foot));
     place.run(&["sensitivity", "spherical-earth", "--altitude", "240", "-o", "e.csv", "-o", "e.svg"]).expect(0);
     let table = rows(&place.read("e.csv"));
     let middle = table.iter().find(|r| cell(r, "latitude_deg") == "45").unwrap();

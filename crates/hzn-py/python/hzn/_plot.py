@@ -35,7 +35,8 @@ def plot(report: Report, picture: NDArray[np.uint8] | None, size: tuple[int, int
     ax.set_ylabel("v, px")
     ax.set_title("\n".join(_words(each) for each in [report, *report.others]), fontsize="small", loc="left")
     if ax.get_legend_handles_labels()[0]:
-        ax.legend(loc="best", fontsize="small")
+        # Beside the axes it covers neither the limb nor its points.
+        ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")
     return ax
 
 

@@ -6,7 +6,7 @@ use hzn_calib::board::{Calibrated, Residual, ViewResult};
 use hzn_core::camera::{Config, Equation, Intrinsic};
 use hzn_plot::{Chart, Series, Style};
 
-use super::lens_text::{self, Reasons};
+use super::lens_text::Reasons;
 use crate::html::{DARK, STYLE, escape, provenance};
 
 /// Width of the pictures of the frame, in pixels of the page.

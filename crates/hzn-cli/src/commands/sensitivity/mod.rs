@@ -12,8 +12,8 @@ mod sweep;
 mod table;
 mod yaw;
 
-use hzn_run::disk;
 use hzn_run::source::ending;
+use hzn_run::{disk, provenance};
 
 use crate::exit::{Exit, Outcome, usage};
 use crate::files;
@@ -46,11 +46,18 @@ pub(super) fn run(args: &Args) -> Outcome {
                 let what = "there is no range to plot over: give one, for example --fov 60:150";
                 return Err(usage(format!("{}: {what}", path.display())));
             };
-            chart.svg()?.into_bytes()
+            let hash = sensor_hash(args);
+            let foot = provenance::line(hash.as_deref(), &provenance::command("hzn"));
+            chart.clone().with_foot(foot).svg()?.into_bytes()
         };
         disk::write(path, bytes)?;
     }
     tell::result(table.text())?;
     notes.iter().for_each(tell::line);
     Ok(Exit::Done)
+}
+
+/// Returns the hash of the sensor whose design is studied, if one was given.
+fn sensor_hash(args: &Args) -> Option<String> {
+    provenance::hash(&hzn_files::sensor::load(args.sensor.as_deref()?).ok()?.config)
 }
