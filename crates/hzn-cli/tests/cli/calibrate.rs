@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use crate::common::assert_provenance;
+
 const SCENE: &str = r#"
 name = "small"
 utc = 2019-06-13T10:30:00Z
@@ -91,6 +93,7 @@ fn a_flight_gives_limb_height_and_noise_or_the_reason_why_not() {
     assert!((km - true_km).abs() < 3.0 * sigma && sigma < 3.5, "{km} ± {sigma}, {true_km}");
     let html = std::fs::read_to_string(at.join("out.html")).unwrap();
     assert_eq!(html.matches("<svg").count(), 2);
+    assert_provenance(&html, true, "hzn calibrate noise");
     assert!(html.contains("Correlation of the residuals"));
 
     // The new sensor answers.

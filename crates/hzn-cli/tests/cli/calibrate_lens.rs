@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::common::Place;
+use crate::common::{Place, assert_provenance};
 
 /// Real pictures of a board with 9 × 6 inner corners.
 const BOARDS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/boards");
@@ -48,6 +48,8 @@ fn real_boards_give_a_camera() {
     let (code, shown, stderr) = run(&place, &["camera", "show", "camera.toml"]);
     assert!(code == 0 && shown.contains("brown-conrady"), "{shown} {stderr}");
     let page = place.read("report.html");
+    // The pictures of a board belong to no sensor yet.
+    assert_provenance(&page, false, "hzn calibrate board");
     assert!(page.contains("<svg") && page.contains("left14.jpg") && page.contains("1 sigma of the radial curve"));
     let table = hzn_calib::residual_table::read(&place.path("residuals.csv")).unwrap();
     let counts: Vec<_> = table.iter().filter(|(_, r)| r.counts).collect();

@@ -1,6 +1,6 @@
 //! `hzn calibrate sky` and `hzn calibrate check`, from beginning to end through the binary.
 
-use crate::common::Place;
+use crate::common::{Place, assert_provenance};
 
 const FLIGHT: &str = r#"
 name = "small"
@@ -96,6 +96,7 @@ fn the_lens_comes_from_the_limb_and_is_checked() {
     let sigma: f64 = ran.out.split("fx = ").nth(1).unwrap().split(' ').nth(3).unwrap().parse().unwrap();
     assert!(sigma < 6.0 && (focal - 240.0).abs() < 3.0 * sigma, "{}", ran.out);
     assert!(place.read("new.html").contains("<svg"));
+    assert_provenance(&place.read("new.html"), true, "hzn calibrate sky");
     // The file works, and the calibration that it holds is not rejected by the flight.
     place.run(&["camera", "show", "new.toml"]).expect(0);
     let check = place.run(&["calibrate", "check", "flight", "-s", "new.toml", "-q"]).expect(0);

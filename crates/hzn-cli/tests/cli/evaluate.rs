@@ -1,6 +1,6 @@
 //! `hzn evaluate` on a few pictures whose truth is known by construction.
 
-use crate::common::{Place, SENSOR};
+use crate::common::{Place, SENSOR, assert_provenance};
 
 const HEADER: &str = "file,time_s,body,limb,axis_x,axis_y,axis_z,half_angle_deg,altitude_km,sun_x,sun_y,sun_z,moon_x,\
                       moon_y,moon_z,qw,qx,qy,qz\n";
@@ -52,7 +52,8 @@ fn a_run_against_its_truth_as_text_json_and_page() {
 
     let page = place.read("r.html");
     let command = "<code>hzn evaluate out.mcap --truth in/truth.csv -o r.json -o r.html</code>";
-    assert!(page.contains(command) && page.contains(&format!("hzn {}", env!("CARGO_PKG_VERSION"))));
+    assert!(page.contains(command));
+    assert_provenance(&page, true, "hzn evaluate out.mcap");
     let facts: serde_json::Value =
         serde_json::from_str(&place.run(&["info", "out.mcap", "--json"]).expect(0).out).unwrap();
     let sensor = facts["sensor_hash"].as_str().unwrap();
@@ -77,7 +78,7 @@ fn missed_and_false_answers_are_the_worst_frames() {
         .replace("black.png,5,earth-sphere,0", "black.png,5,earth-sphere,1");
     place.write("lies.csv", lies.as_bytes());
     let out = place
-        .run(&["evaluate", "out.csv", "--truth", "lies.csv", "--worst", "2", "-s", "in/sensor.toml"])
+        .run(&["evaluate", "out.csv", "--truth", "lies.csv", "--worst", "2", "-s", "in/sensor.toml", "-o", "lies.html"])
         .expect(0)
         .out;
     assert!(out.contains("answered           4 of 5") && out.contains("false answers      1 of 1"), "{out}");
@@ -85,6 +86,8 @@ fn missed_and_false_answers_are_the_worst_frames() {
     assert!(worst[0].contains("0001.png") && worst[0].contains("answered without a limb in view"), "{out}");
     assert!(worst[1].contains("black.png") && worst[1].contains("not answered: no-limb"), "{out}");
     assert_eq!(worst.len(), 2);
+    // The charts mark the picture that shows the limb and has no answer.
+    assert!(place.read("lies.html").contains("no answer (1)"));
 }
 
 #[test]

@@ -38,6 +38,19 @@ pub fn limb(width: u32, height: u32, shift: f64) -> image::GrayImage {
     })
 }
 
+/// Checks the last line of a page: the version, the time in UTC, the sensor if there is one, and the command.
+pub fn assert_provenance(page: &str, has_sensor: bool, command: &str) {
+    let version = format!("hzn {}, ", env!("CARGO_PKG_VERSION"));
+    let (_, line) = page.rsplit_once(&version).unwrap_or_else(|| panic!("no version: {page}"));
+    let (date, rest) = line.split_once(", ").unwrap();
+    // 2026-11-28T19:00:55Z, perhaps with parts of a second.
+    let form: String = date.chars().map(|c| if c.is_ascii_digit() { '0' } else { c }).collect();
+    assert!(form.starts_with("0000-00-00T00:00:00") && form.ends_with('Z'), "{date}");
+    let hash = rest.strip_prefix("sensor ").map(|rest| rest.chars().take_while(|c| c.is_ascii_hexdigit()).count());
+    assert_eq!(hash, has_sensor.then_some(12), "{rest}");
+    assert!(rest.contains(&format!("<code>{command}")), "{rest}");
+}
+
 /// Returns the checksum of PNG.
 pub fn crc32(data: &[u8]) -> u32 {
     let step = |crc: u32, byte: &u8| {
