@@ -6,7 +6,7 @@ use egui_plot::{HLine, Line, Plot, Points};
 use super::dialogs::escape;
 use super::viewer::Viewer;
 use super::{placement, theme};
-use crate::work::calibration::{Marks, Measured};
+use crate::work::measured::{Marks, Measured};
 
 pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context, picture: egui::Rect) {
     let Some(mut window) = viewer.calibration.take() else { return };

@@ -1,7 +1,8 @@
 //! The state of the window that calibrates.
 
 use super::board_form::BoardForm;
-use crate::work::calibration::{Calibration, Measured};
+use crate::work::calibration::Calibration;
+use crate::work::measured::Measured;
 
 /// A calibration: in progress, or with its result.
 pub(super) struct CalibrationWindow {

@@ -10,7 +10,8 @@ use hzn_mcap::{Row, RowMeta};
 
 use super::frame_view::BodyResult;
 
-/// Returns the answer to a picture: its axis in the camera, its half-angle, and the camera's altitude. 1 sigma is 1 mrad.
+/// Returns the answer to a picture: its axis in the camera, its half-angle, and the altitude of the camera. 1 sigma is
+/// 1 mrad.
 pub(super) fn answer(kind: Kind, axis: [f64; 3], half_angle_rad: f64, altitude_km: f64) -> BodyResult {
     let axis = UnitVec3::try_new(axis).unwrap();
     let [x, y, z] = axis.xyz();

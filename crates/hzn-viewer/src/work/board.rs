@@ -10,7 +10,7 @@ use hzn_core::image::Channel;
 use hzn_run::explain::counted;
 use hzn_run::source::{self, Item, Payload};
 
-use super::calibration::{Marks, Measured, Steps};
+use super::measured::{Marks, Measured, Steps};
 
 /// Name of the calibration on the screen.
 pub const NAME: &str = "Lens from board pictures";

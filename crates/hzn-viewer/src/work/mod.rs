@@ -19,6 +19,7 @@ mod frames_table;
 pub mod ground;
 pub mod job;
 pub mod line;
+pub mod measured;
 pub mod open;
 pub mod paint;
 pub mod plots;

@@ -14,10 +14,10 @@ const J2000_S: f64 = 946_728_000.0;
 const CENTURY_S: f64 = 86_400.0 * 36_525.0;
 
 /// Stars to magnitude 3 with a name of their own: name, right ascension and declination (J2000, degrees), visual
-/// magnitude, the brightest first. Sources: the catalogue of star names of the International Astronomical Union (IAU-CSN,
-/// 4 April 2022, Creative Commons Attribution) for the names, the Hipparcos catalogue (ESA 1997) for the rest. A
-/// double star has the magnitude of both. Toliman is left out, because it is 0.004° from Rigil Kentaurus. Their own
-/// motion is left out: at most 0.03° in 30 years.
+/// magnitude, the brightest first. Sources: the catalogue of star names of the International Astronomical Union
+/// (IAU-CSN, 4 April 2022, Creative Commons Attribution) for the names, the Hipparcos catalogue (ESA 1997) for the
+/// rest. A double star has the magnitude of both. Toliman is left out, because it is 0.004° from Rigil Kentaurus. Their
+/// own motion is left out: at most 0.03° in 30 years.
 const STARS: &[(&str, f64, f64, f64)] = &[
     ("Sirius", 101.2872, -16.7161, -1.44),
     ("Canopus", 95.9880, -52.6957, -0.62),

@@ -31,7 +31,7 @@ fn a_recent_folder_has_its_first_picture_and_a_click_opens_it() {
     assert_eq!(files(&dir.path().join("config").join("thumbnails")).len(), 1, "the small picture is kept");
     window.get_by_role_and_label(Role::Button, "First picture of pictures").click();
     settled(&mut window);
-    assert_eq!(window.state().sequence().inputs, [pictures.clone()]);
+    assert_eq!(window.state().sequence().inputs, std::slice::from_ref(&pictures));
     assert_eq!(frame_view(&window).name, "0.png");
 }
 
