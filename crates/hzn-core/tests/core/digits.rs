@@ -271,6 +271,10 @@ fn of_positions_of_an_ellipsoid() {
             for (what, prior) in [("attitude", told), ("sun", with_sun), ("range", near)] {
                 table.add(&format!("turn {turn} phase {phase} {what}"), &process(&config, &prior, &data));
             }
+            // Only the direction is fitted; the distance is that of the altitude.
+            config.fit.position = Some(false);
+            (config.body.altitude_km, config.body.altitude_sigma_km) = (Some(dot(centre, centre).sqrt() - 71e3), 2e4);
+            table.add(&format!("turn {turn} phase {phase} direction"), &process(&config, &with_sun, &data));
         }
     }
     table.check();

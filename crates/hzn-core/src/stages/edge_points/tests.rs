@@ -123,6 +123,22 @@ fn linear_counts_and_an_unknown_tone_have_the_same_points() {
 }
 
 #[test]
+fn the_edge_of_a_glare_is_at_the_threshold() {
+    // The light falls from 220 to 20 counts over 10 px, and is 70 counts 2.5 px outside of the middle.
+    let data = picture([0.0, 1.0], 49.8, 5.0, 20.0, 220.0);
+    let grey = Grey::try_new(&data, Layout::packed(100, 100, 1, 8)).unwrap();
+    let region = Region::<f64>::whole(100, 100);
+    let binary = BinaryPicture::new(&grey, &region, 70, &Unobserved).with_blooming(true);
+    let row = (0..100).find(|&y| binary.lit(50, y)).unwrap();
+    let border: Vec<Pixel> = (20..80).map(|x| Pixel { x, y: row }).collect();
+    let mut blocks = [Block::default(); 8];
+    let made = locate_edge_points(&binary, &Config::default(), &border, 0, &mut blocks, u32::MAX);
+    assert_eq!(made.count, 60);
+    let v = blocks[0].point(0).v;
+    assert!((v - (49.8 - 2.5)).abs() < 0.1, "{v}");
+}
+
+#[test]
 fn without_sub_pixel_points_stand_half_a_pixel_out() {
     let data = picture([0.0, 1.0], 49.8, 0.1, 20.0, 220.0);
     let config = Config { sub_pixel: SubPixel::None, ..Config::default() };

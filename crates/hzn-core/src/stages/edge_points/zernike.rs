@@ -219,6 +219,13 @@ mod tests {
         let binary = BinaryPicture::new(&picture, &region, 45, &Unobserved);
         assert_eq!(steepest(&binary, 4, 1), Some((4, 1)));
         assert_eq!(steepest(&binary, 3, 1), Some((4, 1)));
+        // The same picture on its side.
+        let turned: std::vec::Vec<u8> = (0..24).map(|i| rows[i % 3][i / 3]).collect();
+        let region = Region::<f64>::whole(3, 8);
+        let picture = Grey::try_new(&turned[..], Layout::packed(3, 8, 1, 8)).unwrap();
+        let binary = BinaryPicture::new(&picture, &region, 45, &Unobserved);
+        assert_eq!(steepest(&binary, 1, 4), Some((1, 4)));
+        assert_eq!(steepest(&binary, 1, 3), Some((1, 4)));
     }
 
     #[test]
