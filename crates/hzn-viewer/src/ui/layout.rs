@@ -6,8 +6,8 @@ use super::command::Command;
 use super::panels::Panel;
 use super::viewer::Viewer;
 use super::{
-    calibration, command, compare, dialogs, help, live, number, palette, picture, plots, questions, rig, side,
-    space_view, stages, study, theme, timeline, toasts, top, wizard,
+    calibration, command, compare, dialogs, help, kept_sensor, live, number, palette, picture, plots, questions, rig,
+    side, space_view, stages, study, theme, timeline, toasts, top, wizard,
 };
 
 impl Viewer {
@@ -53,6 +53,7 @@ impl Viewer {
         // A quick answer to a change in the panels is shown in this frame of the window.
         self.request_frame();
         self.wait(&ctx);
+        kept_sensor::show(self, ui);
         compare::show(self, ui);
         let rect = picture::show(self, ui);
         if is_open && self.panels.stages_float() && self.panels.shows(Panel::Stages, &self.settings) {

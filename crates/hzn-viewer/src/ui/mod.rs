@@ -17,6 +17,7 @@ mod follow;
 mod globe;
 mod help;
 mod histogram;
+mod kept_sensor;
 mod layout;
 mod links;
 mod live;

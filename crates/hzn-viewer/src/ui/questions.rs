@@ -6,7 +6,7 @@ use egui::{Id, Modal, RichText, Ui};
 
 use super::dialogs::changed_lines;
 use super::path_dialog::Purpose;
-use super::viewer::{Leave, Viewer, replaced};
+use super::viewer::{Leave, Outside, Viewer, replaced};
 use crate::model::autosave::absolute;
 use crate::model::{FileChange, Session};
 
@@ -16,8 +16,11 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
             Leave::Window => "You close the window",
             Leave::Sequence(_) => "You open other pictures",
             Leave::Sensor(_) => "You open another sensor.toml",
+            Leave::NewSensor => "You make a new sensor.toml",
         };
         unsaved(viewer, ctx, what);
+    } else if let Some(outside) = viewer.changes.outside.clone() {
+        other_folder(viewer, ctx, &outside);
     } else if let Some(change) = viewer.changes.of_file {
         changed_file(viewer, ctx, change);
     } else if let Some(dialog) = viewer.path_dialog.as_ref().filter(|dialog| dialog.replaces) {
@@ -51,6 +54,33 @@ fn unsaved(viewer: &mut Viewer, ctx: &egui::Context, what: &str) {
         viewer.discard_and_leave(ctx);
     } else if cancel || shown.should_close() {
         viewer.changes.question = None;
+    }
+}
+
+/// Asks whether a sensor.toml outside the folder of the pictures is written.
+fn other_folder(viewer: &mut Viewer, ctx: &egui::Context, outside: &Outside) {
+    let (mut there, mut inside, mut cancel) = (false, false, false);
+    let shown = Modal::new(Id::unique("file of another folder")).show(ctx, |ui| {
+        ui.set_max_width(460.0);
+        ui.heading("Save into another folder?");
+        ui.add_space(4.0);
+        ui.label("This file is not in the folder of the pictures, so it may belong to other pictures:");
+        path_label(ui, &outside.path);
+        ui.label("The folder of the pictures is:");
+        path_label(ui, &outside.folder);
+        ui.add_space(8.0);
+        ui.horizontal(|ui| {
+            there = ui.button("Save there").clicked();
+            inside = outside.has_choice && ui.button("Save into the folder…").clicked();
+            cancel = ui.button("Cancel").clicked();
+        });
+    });
+    if there {
+        viewer.save_outside();
+    } else if inside {
+        viewer.save_inside();
+    } else if cancel || shown.should_close() {
+        viewer.cancel_save();
     }
 }
 

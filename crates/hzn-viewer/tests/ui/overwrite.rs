@@ -37,7 +37,7 @@ fn click(window: &mut Window, label: &str) {
 }
 
 fn shows(window: &Window, words: &str) -> bool {
-    window.query_by_label_contains(words).is_some()
+    window.query_all_by_label_contains(words).next().is_some()
 }
 
 fn text(window: &Window) -> String {
@@ -91,9 +91,12 @@ fn a_sensor_that_the_user_opened_stays_and_its_path_is_shown() {
     window.run_steps(60);
     assert!(shows(&window, &format!("Sensor: {}", own.display())));
     assert!(shows(&window, &format!("Pictures: {}", bare.display())));
-    scale_to(&mut window, 1.5);
-    save(&mut window);
-    said(&mut window, &format!("Saved: {}", own.display()));
+
+    // The banner stays until the user decides.
+    let banner = format!("Sensor of {} is used", own.display());
+    assert!(shows(&window, &banner));
+    click(&mut window, "Keep");
+    assert!(!shows(&window, &banner) && window.state().session().is_some());
 
     // The file that the command line names is one that the user opened.
     let request = Request { inputs: vec![pictures], sensor: Some(own.clone()), ..Request::default() };
@@ -101,6 +104,72 @@ fn a_sensor_that_the_user_opened_stays_and_its_path_is_shown() {
     settled(&mut window);
     open_and_wait(&mut window, &bare);
     assert_eq!(window.state().session().unwrap().path(), Some(own.as_path()));
+}
+
+#[test]
+fn a_sensor_of_other_pictures_gives_way_to_a_new_one() {
+    let (dir, pictures) = folder();
+    let (_bare_dir, bare) = bare_folder();
+    let own = another_sensor(dir.path());
+    let mut window = window_on(&pictures);
+    open(&mut window, &own);
+    settled(&mut window);
+    open_and_wait(&mut window, &bare);
+    // Changes of the old sensor are not lost without a question.
+    scale_to(&mut window, 1.2);
+    click(&mut window, "Make a new one");
+    assert!(shows(&window, "Unsaved changes"));
+    click(&mut window, "Discard changes");
+    assert!(window.state().session().is_none() && !shows(&window, "is used"));
+    click(&mut window, "Make sensor.toml");
+    settled(&mut window);
+    assert_eq!(window.state().session().unwrap().home(), bare.join("sensor.toml"));
+    save(&mut window);
+    path(&mut window, &bare.join("sensor.toml"), "Write");
+    said(&mut window, &format!("Saved: {}", bare.join("sensor.toml").display()));
+}
+
+#[test]
+fn a_file_outside_the_folder_is_written_only_if_the_user_agrees() {
+    let (dir, pictures) = folder();
+    let (_bare_dir, bare) = bare_folder();
+    let own = another_sensor(dir.path());
+    let before = std::fs::read_to_string(&own).unwrap();
+    let mut window = window_on(&pictures);
+    open(&mut window, &own);
+    settled(&mut window);
+    open_and_wait(&mut window, &bare);
+    scale_to(&mut window, 1.5);
+    save(&mut window);
+    let asks = |window: &Window| shows(window, "Save into another folder?");
+    assert!(asks(&window) && shows(&window, &own.canonicalize().unwrap().display().to_string()));
+    click(&mut window, "Cancel");
+    assert!(!asks(&window) && std::fs::read_to_string(&own).unwrap() == before);
+
+    // One answer is enough for these pictures.
+    save(&mut window);
+    click(&mut window, "Save there");
+    said(&mut window, &format!("Saved: {}", own.display()));
+    scale_to(&mut window, 1.7);
+    save(&mut window);
+    assert!(!asks(&window) && std::fs::read_to_string(&own).unwrap() == text(&window));
+
+    // Other pictures ask again, and their folder is the other choice.
+    let (_last_dir, last) = bare_folder();
+    open_and_wait(&mut window, &last);
+    scale_to(&mut window, 1.9);
+    save(&mut window);
+    assert!(asks(&window));
+    click(&mut window, "Save into the folder…");
+    window.run_steps(3);
+    click(&mut window, "Write");
+    said(&mut window, &format!("Saved: {}", last.canonicalize().unwrap().join("sensor.toml").display()));
+    assert!(!std::fs::read_to_string(&own).unwrap().contains("1.9"));
+    assert_eq!(std::fs::read_to_string(last.join("sensor.toml")).unwrap(), text(&window));
+    // This file lies in the folder, so it needs no question.
+    scale_to(&mut window, 1.3);
+    save(&mut window);
+    assert!(!asks(&window) && !window.state().session().unwrap().is_changed());
 }
 
 #[test]

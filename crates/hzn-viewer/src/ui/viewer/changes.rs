@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use super::outside::Outside;
 use crate::model::{Autosave, FileChange, Session, Unsaved};
 use crate::work::open::Request;
 
@@ -15,6 +16,8 @@ pub(in crate::ui) enum Leave {
     Sequence(Box<Request>),
     /// Use another sensor.toml.
     Sensor(Box<Session>),
+    /// Make a new sensor.toml for the pictures.
+    NewSensor,
 }
 
 /// The state of changes that are not saved.
@@ -28,6 +31,12 @@ pub(in crate::ui) struct Changes {
     pub(in crate::ui) of_file: Option<FileChange>,
     /// The question about this file also shows how its text differs.
     pub(in crate::ui) shows_difference: bool,
+    /// The file that is to be saved lies outside the folder of the pictures, and the user is asked about it.
+    pub(in crate::ui) outside: Option<Outside>,
+    /// The file that the user wants to be written while these pictures are open.
+    pub(in crate::ui) agreed: Option<PathBuf>,
+    /// The sensor was opened for other pictures, and the user has not said yet whether it is used for these.
+    pub(in crate::ui) is_sensor_kept: bool,
     /// The window may close: there is nothing to lose, or the user answered.
     pub(in crate::ui) may_close: bool,
     /// A session of a window that ended with changes, and its file.
@@ -41,7 +50,7 @@ pub(in crate::ui) struct Changes {
 impl Changes {
     /// Returns true while the user is asked about changes.
     pub(in crate::ui) fn is_asking(&self) -> bool {
-        self.question.is_some() || self.of_file.is_some() || self.lost.is_some()
+        self.question.is_some() || self.of_file.is_some() || self.outside.is_some() || self.lost.is_some()
     }
 
     /// Prepares the autosaving into the folder of the settings file.

@@ -11,6 +11,7 @@ mod jobs;
 mod keep_settings;
 mod line;
 mod outputs;
+mod outside;
 mod request_key;
 mod rig;
 mod sequence_work;
@@ -53,6 +54,7 @@ use changes::Changes;
 pub(super) use changes::Leave;
 use companions::Companions;
 pub(super) use outputs::replaced;
+pub(super) use outside::Outside;
 use request_key::RequestKey;
 use sequence_work::SequenceWork;
 
@@ -381,6 +383,7 @@ impl Viewer {
     pub(super) fn set_session(&mut self, session: Session) {
         // A question about the file of the old session would be answered for the new one.
         self.cancel_save();
+        self.changes.is_sensor_kept = false;
         self.path_dialog.take_if(|dialog| dialog.replaces);
         self.session = Some(session);
         self.requested = None;

@@ -8,10 +8,15 @@ use crate::model::{FileChange, Place, autosave};
 use crate::ui::path_dialog::{Answer, PathDialog, Purpose};
 
 impl Viewer {
-    /// Saves the sensor.toml to its file, or asks first: for a path if the text comes from a recording, and what to do
-    /// if another program changed the file.
+    /// Saves the sensor.toml to its file, or asks first: for a path if the text comes from a recording, whether a file
+    /// of another folder is meant, and what to do if another program changed the file.
     pub(super) fn save(&mut self) {
         let Some(session) = &self.session else { return };
+        let outside = session.path().and_then(|path| self.question_outside(path));
+        if outside.is_some() {
+            self.changes.outside = outside;
+            return;
+        }
         match (session.path().map(Path::to_owned), session.file_change()) {
             (None, _) => self.ask(PathDialog::new(Purpose::SaveSensor, &autosave::absolute(session.home()))),
             (Some(_), Some(change)) => self.changes.of_file = Some(change),
@@ -23,6 +28,8 @@ impl Viewer {
     fn save_to(&mut self, path: &Path) {
         match self.session.as_mut().map(|s| s.save(path)) {
             Some(Ok(())) => {
+                self.agree_to_file(path);
+                self.changes.is_sensor_kept = false;
                 self.add_note(format!("Saved: {}", autosave::absolute(path).display()));
                 self.continue_after_save();
             }
@@ -58,6 +65,7 @@ impl Viewer {
     /// Takes the answer "Cancel" to the same question. What waited for the saved file does not happen.
     pub(in crate::ui) fn cancel_save(&mut self) {
         (self.changes.of_file, self.changes.after_save, self.changes.shows_difference) = (None, None, false);
+        self.changes.outside = None;
     }
 
     /// Reads a sensor.toml again that another program changed while the window has no changes of its own, when the user

@@ -35,6 +35,10 @@ impl Viewer {
             }
             Leave::Sequence(request) => self.open(*request),
             Leave::Sensor(session) => self.set_session(*session),
+            Leave::NewSensor => {
+                (self.session, self.changes.is_sensor_kept) = (None, false);
+                self.open_wizard();
+            }
         }
     }
 
