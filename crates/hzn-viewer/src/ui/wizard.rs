@@ -4,33 +4,57 @@ use egui::{DragValue, Id, Modal, Ui};
 use hzn_files::start::Body;
 
 use super::viewer::Viewer;
-use super::wizard_form::Wizard;
+use super::wizard_form::{FocalFrom, Wizard};
 use super::{number, theme};
+
+/// What the form says before the limb is measured.
+const FROM_LIMB: &str = "The limb in the pictures says lens and field of view, if the altitude is right. This takes some \
+                         seconds.";
 
 pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
     let Some(mut wizard) = viewer.wizard.take() else { return };
     let (mut make, mut cancel) = (false, false);
-    let outcome = wizard.write();
+    // Without a lens, the file is made from the pictures once the user wants it.
+    let outcome = (wizard.focal_from != FocalFrom::Limb).then(|| wizard.write());
+    let can_make = outcome.as_ref().map_or(wizard.measuring.is_none(), Result::is_ok);
     let shown = Modal::new(Id::unique("wizard")).show(ctx, |ui| {
         ui.set_max_width(480.0);
         ui.heading("Make a sensor.toml");
         ui.label("Rough values are enough to begin: their sigmas become part of the covariance.");
         ui.add_space(6.0);
-        questions(ui, &mut wizard);
+        ui.add_enabled_ui(wizard.measuring.is_none(), |ui| questions(ui, &mut wizard));
         ui.add_space(6.0);
+        let warning = theme::warning(ui.visuals().dark_mode);
         match &outcome {
-            Ok(start) => drop(ui.label(Wizard::sigmas_in_words(start))),
-            Err(why) => drop(ui.colored_label(theme::warning(ui.visuals().dark_mode), why)),
+            Some(Ok(start)) => drop(ui.label(Wizard::sigmas_in_words(start))),
+            Some(Err(why)) => drop(ui.colored_label(warning, why)),
+            None => of_limb(ui, &wizard),
         }
         ui.horizontal(|ui| {
-            make = ui.add_enabled(outcome.is_ok(), egui::Button::new("Make sensor.toml")).clicked();
+            make = ui.add_enabled(can_make, egui::Button::new("Make sensor.toml")).clicked();
             cancel = ui.button("Cancel").clicked();
         });
     });
     match outcome {
-        Ok(start) if make => viewer.begin_session(&start.text, start.warnings),
-        _ if cancel || shown.should_close() => {}
-        _ => viewer.wizard = Some(wizard),
+        Some(Ok(start)) if make => return viewer.begin_session(&start.text, start.warnings),
+        None if make => viewer.measure_lens(&mut wizard),
+        _ if cancel || shown.should_close() => return,
+        _ => {}
+    }
+    viewer.wizard = Some(wizard);
+}
+
+/// Says how far the measurement of the lens is.
+fn of_limb(ui: &mut Ui, wizard: &Wizard) {
+    if wizard.measuring.is_some() {
+        ui.horizontal(|ui| {
+            ui.spinner();
+            ui.label("The limb in the pictures is measured…");
+        });
+    } else if let Some(why) = &wizard.no_lens {
+        ui.colored_label(theme::warning(ui.visuals().dark_mode), why);
+    } else {
+        ui.label(FROM_LIMB);
     }
 }
 
@@ -41,20 +65,28 @@ fn questions(ui: &mut Ui, wizard: &mut Wizard) {
         let camera = wizard.exif.camera.clone().map(|c| format!(", {c}")).unwrap_or_default();
         ui.label(format!("{w} × {h} px{camera}"));
         ui.end_row();
-        ui.label("lens");
-        ui.horizontal(|ui| {
-            ui.selectable_value(&mut wizard.fisheye, false, "pinhole").on_hover_text("Straight lines stay straight");
-            ui.selectable_value(&mut wizard.fisheye, true, "fisheye").on_hover_text("Also for more than 90°");
-        });
-        ui.end_row();
         ui.label("focal length");
-        ui.horizontal(|ui| {
-            ui.selectable_value(&mut wizard.states_fov, true, "from the field of view");
-            let known = wizard.exif.focal_mm.is_some() || wizard.exif.focal_35mm_mm.is_some();
-            ui.add_enabled_ui(known, |ui| ui.selectable_value(&mut wizard.states_fov, false, "from EXIF"));
+        ui.vertical(|ui| {
+            let from = &mut wizard.focal_from;
+            ui.horizontal(|ui| {
+                ui.selectable_value(from, FocalFrom::FieldOfView, "from the field of view");
+                let known = wizard.exif.focal_mm.is_some() || wizard.exif.focal_35mm_mm.is_some();
+                ui.add_enabled_ui(known, |ui| ui.selectable_value(from, FocalFrom::Exif, "from EXIF"));
+            });
+            let unknown = ui.selectable_value(from, FocalFrom::Limb, "I do not know the lens");
+            unknown.on_hover_text("The limb in the pictures says kind and focal length");
         });
         ui.end_row();
-        if wizard.states_fov {
+        if wizard.focal_from != FocalFrom::Limb {
+            ui.label("lens");
+            ui.horizontal(|ui| {
+                let pinhole = ui.selectable_value(&mut wizard.fisheye, false, "pinhole");
+                pinhole.on_hover_text("Straight lines stay straight");
+                ui.selectable_value(&mut wizard.fisheye, true, "fisheye").on_hover_text("Also for more than 90°");
+            });
+            ui.end_row();
+        }
+        if wizard.focal_from == FocalFrom::FieldOfView {
             let label = ui.label("field of view over the width");
             let drag = DragValue::new(&mut wizard.fov_deg).range(1.0..=300.0).speed(0.5).suffix("°");
             number::drag(ui, drag).labelled_by(label.id);

@@ -3,13 +3,25 @@
 use hzn_core::camera::Model;
 use hzn_files::start::{self, Body, CameraFacts, Exif, StartConfig};
 
+use crate::work::lens_from_limb::LensFromLimb;
+
+/// Where the focal length comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum FocalFrom {
+    /// The user states the field of view.
+    FieldOfView,
+    /// EXIF has it.
+    Exif,
+    /// The user does not know the lens, so that the limb in the pictures says it.
+    Limb,
+}
+
 /// The answers of the user, and what the picture itself says.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub(super) struct Wizard {
     pub(super) size_px: [u32; 2],
     pub(super) exif: Exif,
-    /// The field of view is stated; otherwise the focal length comes from EXIF.
-    pub(super) states_fov: bool,
+    pub(super) focal_from: FocalFrom,
     pub(super) fov_deg: f64,
     pub(super) fisheye: bool,
     /// The pictures have altitudes of their own, from frames.csv or a recording.
@@ -18,6 +30,10 @@ pub(super) struct Wizard {
     pub(super) one_altitude: bool,
     pub(super) altitude_km: f64,
     pub(super) body: Body,
+    /// The measurement of the lens in the pictures, while it runs.
+    pub(super) measuring: Option<LensFromLimb>,
+    /// Why this measurement had no result.
+    pub(super) no_lens: Option<String>,
 }
 
 impl Wizard {
@@ -27,13 +43,24 @@ impl Wizard {
         Self {
             size_px,
             exif,
-            states_fov: !known,
+            focal_from: if known { FocalFrom::Exif } else { FocalFrom::FieldOfView },
             fov_deg: 60.0,
             fisheye: false,
             has_altitudes,
             one_altitude: !has_altitudes,
             altitude_km: 400.0,
             body: Body::default(),
+            measuring: None,
+            no_lens: None,
+        }
+    }
+
+    /// Returns what the answers say apart from the lens.
+    pub(super) fn facts_without_lens(&self) -> CameraFacts {
+        CameraFacts {
+            altitude_km: self.one_altitude.then_some(self.altitude_km),
+            body: self.body,
+            ..CameraFacts::of_size(self.size_px)
         }
     }
 
@@ -43,12 +70,10 @@ impl Wizard {
     /// The field of view is impossible for the lens, or EXIF has no focal length; the message says what to do.
     pub(super) fn write(&self) -> Result<StartConfig, String> {
         let facts = CameraFacts {
-            fov_deg: self.states_fov.then_some(self.fov_deg),
+            fov_deg: (self.focal_from == FocalFrom::FieldOfView).then_some(self.fov_deg),
             lens: Some(if self.fisheye { Model::Equidistant } else { Model::Pinhole }),
             exif: self.exif.clone(),
-            altitude_km: self.one_altitude.then_some(self.altitude_km),
-            body: self.body,
-            ..CameraFacts::of_size(self.size_px)
+            ..self.facts_without_lens()
         };
         start::write_sensor_toml(&facts).map_err(|e| e.to_string())
     }
@@ -74,7 +99,7 @@ mod tests {
     #[test]
     fn the_answers_make_a_sensor_that_works() {
         let mut wizard = Wizard::new([640, 480], Exif::default(), false);
-        assert!(wizard.states_fov, "this picture has no EXIF");
+        assert_eq!(wizard.focal_from, FocalFrom::FieldOfView, "this picture has no EXIF");
         wizard.fov_deg = 90.0;
         let start = wizard.write().unwrap();
         let session = Session::new(&start.text, Path::new("sensor.toml"), None);
@@ -93,6 +118,6 @@ mod tests {
         assert!(wizard.write().unwrap_err().contains("200"));
         let exif = Exif { focal_mm: Some(24.0), focal_35mm_mm: Some(24.0), ..Exif::default() };
         let from_exif = Wizard::new([6000, 4000], exif, true);
-        assert!(!from_exif.states_fov && from_exif.write().is_ok());
+        assert!(from_exif.focal_from == FocalFrom::Exif && from_exif.write().is_ok());
     }
 }

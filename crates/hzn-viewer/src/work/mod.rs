@@ -18,6 +18,7 @@ pub mod frame_view;
 mod frames_table;
 pub mod ground;
 pub mod job;
+pub mod lens_from_limb;
 pub mod line;
 pub mod measured;
 pub mod open;

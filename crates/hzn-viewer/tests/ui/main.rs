@@ -5,6 +5,7 @@ mod causes;
 mod clear;
 mod companions;
 mod exports;
+mod first_sensor;
 mod found;
 mod ground;
 mod live;

@@ -17,6 +17,7 @@ use crate::ui::wizard_form::Wizard;
 use crate::work::board;
 use crate::work::calibration::{self, Calibration, Kind};
 use crate::work::demo::{self, Sample};
+use crate::work::lens_from_limb::LensFromLimb;
 use crate::work::open::Request;
 use crate::work::study::{Study, Task};
 use crate::work::thumbnails::Thumbnail;
@@ -31,6 +32,28 @@ impl Viewer {
         };
         let has_altitudes = self.sequence.has_altitudes();
         self.wizard = Some(Wizard::new(size.map(|x| x as u32), exif, has_altitudes));
+    }
+
+    /// Starts the measurement of the lens in the pictures, for the form.
+    pub(in crate::ui) fn measure_lens(&self, wizard: &mut Wizard) {
+        let request = Request { inputs: self.sequence.inputs.clone(), ..self.request.clone() };
+        wizard.no_lens = None;
+        wizard.measuring = Some(LensFromLimb::start(request, wizard.facts_without_lens(), &self.wake));
+    }
+
+    /// Takes the lens that the limb says: the form ends with a sensor.toml, or says why there is none.
+    pub(super) fn poll_lens(&mut self) {
+        let Some(wizard) = &mut self.wizard else { return };
+        let Some(end) = wizard.measuring.as_ref().and_then(LensFromLimb::end) else { return };
+        wizard.measuring = None;
+        match end {
+            Ok(found) => {
+                self.wizard = None;
+                self.begin_session(&found.start.text, found.start.warnings);
+                self.add_note(found.says);
+            }
+            Err(why) => wizard.no_lens = Some(why),
+        }
     }
 
     /// Begins a session with a text that is not saved yet.

@@ -50,6 +50,7 @@ impl Viewer {
         self.poll_background();
         self.poll_check();
         self.poll_companions();
+        self.poll_lens();
         self.take_finished_jobs();
         self.poll_path_dialog();
         self.reload_unchanged(ctx);
