@@ -29,6 +29,13 @@ pub struct Pair {
     pub pictures: usize,
 }
 
+impl Pair {
+    /// Returns whether the pictures tell the two values apart. Otherwise many pairs of corrections are equally good.
+    pub fn is_told_apart(&self) -> bool {
+        self.correlation.abs() <= MOST_CORRELATION
+    }
+}
+
 /// Fewest pictures for a pair. With fewer, the scatter of the limb itself often looks like a second wrong value: in one
 /// of ten flights of four pictures.
 const ENOUGH: usize = 8;
@@ -37,8 +44,9 @@ const LEAST_SIGMAS: f64 = 3.0;
 /// The scatter about the best single value has to be this many times that about the pair. Below, the limb itself, which
 /// is not equally high everywhere, may be the reason.
 const LEAST_RATIO: f64 = 1.5;
-/// Corrections that are more correlated than this cannot be told apart.
-const MOST_CORRELATION: f64 = 0.95;
+/// Corrections that are more correlated than this cannot be told apart: the sigma of each is three times as large as if
+/// the other one were known.
+pub const MOST_CORRELATION: f64 = 0.95;
 /// A residual counts at most as much as one of this many sigmas.
 const MOST_SIGMAS: f64 = 5.0;
 const ITERATIONS: usize = 10;
@@ -150,16 +158,19 @@ impl Solved {
     }
 }
 
+/// The quantities of a solution, as places in [`Suspect::ALL`], and the solution.
+type Of = ([usize; 2], Solved);
+
 /// Returns the two values that are wrong, if two of them explain the half-angles of all pictures and no single one
 /// does. `limb_height_km` is the limb height that the pictures were processed with, and its 1-sigma: a limb height more
-/// than three sigmas away is no explanation.
+/// than three sigmas away is no explanation. If the pictures do not tell the two values apart
+/// ([`Pair::is_told_apart`]), the corrections say nothing one by one.
 pub fn find_pair<'a>(facts: impl Iterator<Item = &'a FitFacts>, limb_height_km: [f64; 2]) -> Option<Pair> {
     let [limb_height_km, limb_sigma_km] = limb_height_km;
     let equations: Vec<Equation> = facts.filter_map(|f| Equation::new(f, limb_height_km)).collect();
     if equations.len() < ENOUGH {
         return None;
     }
-    let is_limb = |k: usize| Suspect::ALL.get(k) == Some(&Suspect::LimbHeight);
     let is_possible = |which: [usize; 2], solved: &Solved| {
         which.into_iter().zip(solved.corrections).all(|(k, km)| !is_limb(k) || km.abs() <= 3.0 * limb_sigma_km)
     };
@@ -167,23 +178,21 @@ pub fn find_pair<'a>(facts: impl Iterator<Item = &'a FitFacts>, limb_height_km: 
         let solved = Solved::new(&equations, which).filter(|solved| is_possible(which, solved))?;
         Some((which, solved))
     };
-    let singles = [[0, 0], [1, 1], [2, 2]].into_iter().filter_map(solve);
+    let singles: Vec<Of> = [[0, 0], [1, 1], [2, 2]].into_iter().filter_map(solve).collect();
     let pairs = [[0, 1], [1, 2], [0, 2]].into_iter().filter_map(solve);
-    let apart: Vec<_> = pairs.filter(|(_, solved)| solved.correlation().abs() <= MOST_CORRELATION).collect();
-    let scatter = apart.iter().map(|(_, solved)| solved.scatter(2)).reduce(f64::min)?;
-    // An altitude and a limb height change the half-angles nearly alike. Only the limb height has an expected value.
-    let cost = |(which, solved): &([usize; 2], Solved)| {
-        let limb = which.iter().zip(solved.corrections).filter(|(k, _)| is_limb(**k));
-        solved.chi2(scatter) + limb.map(|(_, km)| (km / limb_sigma_km).powi(2)).sum::<f64>()
+    let (apart, alike): (Vec<Of>, Vec<Of>) =
+        pairs.partition(|(_, solved)| solved.correlation().abs() <= MOST_CORRELATION);
+    let found = [apart, alike].map(|pairs| explain_alone(pairs, &singles, limb_sigma_km));
+    let (which, pair) = match found {
+        // Values that the pictures tell apart give way only if they explain less.
+        [Some(apart), Some(alike)] => {
+            let scatter = alike.1.scatter(2);
+            let gain = apart.1.chi2(scatter) - alike.1.chi2(scatter);
+            if gain > least_gain(equations.len() - 2) { alike } else { apart }
+        }
+        [apart, alike] => apart.or(alike)?,
     };
-    let (which, pair) = apart.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
-    let explains = |single: &Solved| {
-        let gain = single.chi2(scatter) - pair.chi2(scatter);
-        gain < least_gain(equations.len() - 2) || single.scatter(1) < LEAST_RATIO * scatter
-    };
-    if singles.into_iter().any(|(_, single)| explains(&single)) {
-        return None;
-    }
+    let scatter = pair.scatter(2);
     let remedy = |i: usize| {
         let suspect = *Suspect::ALL.get(which[i])?;
         let (x, sigma) = (pair.corrections[i], scatter * pair.inverse[i][i].sqrt());
@@ -191,6 +200,42 @@ pub fn find_pair<'a>(facts: impl Iterator<Item = &'a FitFacts>, limb_height_km: 
         Some(Remedy { suspect, correction, sigma })
     };
     Some(Pair { remedies: [remedy(0)?, remedy(1)?], correlation: pair.correlation(), pictures: equations.len() })
+}
+
+fn is_limb(k: usize) -> bool {
+    Suspect::ALL.get(k) == Some(&Suspect::LimbHeight)
+}
+
+/// Returns the best of some pairs, if no single value explains the pictures nearly as well.
+fn explain_alone(pairs: Vec<Of>, singles: &[Of], limb_sigma_km: f64) -> Option<Of> {
+    let scatter = pairs.iter().map(|(_, solved)| solved.scatter(2)).reduce(f64::min)?;
+    // An altitude and a limb height change the half-angles nearly alike. Only the limb height has an expected value.
+    let cost = |(which, solved): &Of| {
+        let limb = which.iter().zip(solved.corrections).filter(|(k, _)| is_limb(**k));
+        solved.chi2(scatter) + limb.map(|(_, km)| (km / limb_sigma_km).powi(2)).sum::<f64>()
+    };
+    let best = pairs.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
+    let explains = |single: &Solved| {
+        let gain = single.chi2(scatter) - best.1.chi2(scatter);
+        gain < least_gain(single.residuals.len() - 2) || single.scatter(1) < LEAST_RATIO * scatter
+    };
+    (!singles.iter().any(|(_, single)| explains(single))).then_some(best)
+}
+
+/// Returns the correlation of the corrections of two quantities if both may be wrong, -1 to 1. Beyond
+/// [`MOST_CORRELATION`] the pictures do not tell them apart. `None` with fewer than three pictures.
+pub fn correlation<'a>(
+    facts: impl Iterator<Item = &'a FitFacts>,
+    limb_height_km: f64,
+    suspects: [Suspect; 2],
+) -> Option<f64> {
+    let equations: Vec<Equation> = facts.filter_map(|f| Equation::new(f, limb_height_km)).collect();
+    let place = |suspect: Suspect| Suspect::ALL.iter().position(|s| *s == suspect);
+    let which = [place(suspects[0])?, place(suspects[1])?];
+    // Two equations can always be solved for two unknowns, so that they say nothing about the choice.
+    let is_enough = equations.len() > 2 && which[0] != which[1];
+    // Corrections that change all half-angles alike have no solution.
+    is_enough.then(|| Solved::new(&equations, which).map_or(1.0, |solved| solved.correlation()))
 }
 
 #[cfg(test)]
@@ -251,6 +296,27 @@ mod tests {
         assert!((altitude.correction + 20.0).abs() < 3.0 && altitude.sigma < 3.0, "{altitude:?}");
         assert!((focal.correction - 1.06).abs() < 0.01, "{focal:?}");
         assert!(pair.correlation.abs() < 0.95 && pair.pictures == 12);
+    }
+
+    /// From one altitude, a focal length is told apart from an altitude by the place of the limb alone.
+    #[test]
+    fn two_values_are_inseparable_only_above_the_limit_of_the_correlation() {
+        let both = [Suspect::Altitude, Suspect::Focal];
+        for (spread, limit) in [(0.1, 0.0..0.0), (0.2, 0.0..0.0), (0.6, 0.7..0.95), (2.0, 0.4..0.7)] {
+            let one = |i: usize| facts(300.0, 30.0 * (1.0 + spread * [1.0, -1.0, 0.5, -0.5][i % 4]), -40.0, 1.3, 0.0);
+            let all: Vec<FitFacts> = (0..12).map(one).collect();
+            let pair = find_pair(all.iter(), LIMB_KM).unwrap();
+            assert_eq!(pair.remedies.map(|r| r.suspect), both);
+            let size = pair.correlation.abs();
+            let is_apart = !limit.is_empty();
+            assert!(if is_apart { limit.contains(&size) } else { size > 0.95 }, "{spread}: {size}");
+            assert_eq!(pair.is_told_apart(), is_apart);
+            assert_eq!(correlation(all.iter(), LIMB_KM[0], both), Some(pair.correlation));
+        }
+        // An altitude and a limb height act nearly alike from all altitudes.
+        let limb = [Suspect::Altitude, Suspect::LimbHeight];
+        assert!(correlation(flight(-20.0, 1.0).iter(), LIMB_KM[0], limb).unwrap().abs() > MOST_CORRELATION);
+        assert_eq!(correlation(flight(-20.0, 1.0)[..2].iter(), LIMB_KM[0], limb), None);
     }
 
     #[test]

@@ -3,7 +3,8 @@
 use hzn_core::camera::Camera;
 use hzn_core::pixel::ImagePoint;
 
-use super::facts::{FitFacts, Implied};
+use super::facts::{FitFacts, Implied, Suspect};
+use super::joint::{Pair, Remedy};
 use super::together::{Contradiction, Fault};
 
 /// Says which half-angle the limb has, and which altitude or field of view would make it the expected one: `the limb
@@ -28,6 +29,35 @@ pub fn what_fits(fit: &FitFacts, camera: &Camera<f64>, width: u16) -> String {
         (Some(one), None) | (None, Some(one)) => format!("{limb}: {one}"),
         (None, None) => limb,
     }
+}
+
+/// Says which two values together explain the half-angles of several pictures: `no single value explains the 14
+/// pictures, but two do: the altitude is 20.3 ± 1.1 km too low, and the focal length is 812.4 ± 1.9 px`. `focal_px` is
+/// the focal length that the pictures were processed with.
+pub fn two_values(pair: &Pair, focal_px: f64) -> String {
+    let [a, b] = &pair.remedies;
+    let pictures = pair.pictures;
+    if !pair.is_told_apart() {
+        let which = inseparable([a.suspect, b.suspect], pair.correlation);
+        return format!("no single value explains the {pictures} pictures, and two do, but {which}");
+    }
+    let words = |r: &Remedy| match r.suspect {
+        Suspect::Focal => {
+            let [px, by] = [r.correction, r.sigma].map(|x| x * focal_px);
+            format!("the focal length is {px:.1} ± {by:.1} px")
+        }
+        other => {
+            let side = if r.correction > 0.0 { "low" } else { "high" };
+            format!("the {} is {:.1} ± {:.1} km too {side}", other.name(), r.correction.abs(), r.sigma)
+        }
+    };
+    format!("no single value explains the {pictures} pictures, but two do: {}, and {}", words(a), words(b))
+}
+
+/// Says that the pictures do not tell two values apart, and why.
+pub fn inseparable([a, b]: [Suspect; 2], correlation: f64) -> String {
+    let (a, b) = (a.name(), b.name());
+    format!("{a} and {b} cannot be told apart (correlation {correlation:.2}): check the one that you know least")
 }
 
 /// Says which values would explain the half-angles of all answers. `altitude_km` is the median of those that the
@@ -72,4 +102,20 @@ fn field_of_view_deg(camera: &Camera<f64>, width: u16, factor: f64) -> Option<f6
         Some(x.atan2(z).to_degrees())
     });
     Some(right? - left?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_values_are_named_only_if_they_are_told_apart() {
+        let remedy = |suspect, correction, sigma| Remedy { suspect, correction, sigma };
+        let remedies = [remedy(Suspect::Altitude, 20.25, 1.1), remedy(Suspect::Focal, 1.02, 0.002)];
+        let apart = two_values(&Pair { remedies, correlation: -0.4, pictures: 9 }, 800.0);
+        assert!(apart.ends_with("the altitude is 20.2 ± 1.1 km too low, and the focal length is 816.0 ± 1.6 px"));
+        let alike = two_values(&Pair { remedies, correlation: 0.98, pictures: 9 }, 800.0);
+        assert!(alike.contains("altitude and focal length cannot be told apart (correlation 0.98)"), "{alike}");
+        assert!(!alike.contains("20.2"), "{alike}");
+    }
 }

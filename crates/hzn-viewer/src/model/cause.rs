@@ -19,7 +19,7 @@ pub struct Cause {
 /// Reason why a picture with edges has no answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reason {
-    /// The picture has an answer with Otsu's threshold, but none with the threshold in use.
+    /// Otsu's threshold shows a limb, and the threshold in use does not.
     Level,
     /// The verdict of the longest candidate.
     Verdict(Verdict),
@@ -41,12 +41,12 @@ pub fn longest_verdict(report: &Report<f64>) -> Option<Verdict> {
 }
 
 impl Cause {
-    /// Returns the cause of a result. `answered_with_otsu` is true if Otsu's threshold, which is not in use, gives an
-    /// answer.
-    pub fn from_report(report: &Report<f64>, answered_with_otsu: bool) -> Self {
+    /// Returns the cause of a result. `otsu_is_better` is true if Otsu's threshold, which is not in use, gives an answer
+    /// or shows a limb of another size.
+    pub fn from_report(report: &Report<f64>, otsu_is_better: bool) -> Self {
         let reason = match report.status {
             Status::Ok => None,
-            _ if answered_with_otsu => Some(Reason::Level),
+            _ if otsu_is_better => Some(Reason::Level),
             _ => longest_verdict(report).map(Reason::Verdict),
         };
         Self { status: report.status, reason }

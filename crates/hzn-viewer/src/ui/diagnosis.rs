@@ -1,15 +1,18 @@
 //! The diagnosis: why a picture has no answer, in numbers, and a button for each cure.
 
+use std::sync::Arc;
+
 use egui::{RichText, Ui, vec2};
+use hzn_core::Config;
 use hzn_core::body::Kind;
 use hzn_core::status::Status;
-use hzn_core::{Config, threshold};
 
+use super::steps::{self, Step};
 use super::viewer::Viewer;
 use super::{altitude_trial, links, theme};
 use crate::model::Session;
 use crate::model::cause::Reason;
-use crate::model::diagnosis::{self, Consensus, FitFacts, Implied, Pair, Remedy, Suspect};
+use crate::model::diagnosis::{self, Consensus, FitFacts, Implied, Pair, Suspect};
 use crate::work::frame_view::BodyResult;
 use crate::work::trials::OtsuTrial;
 
@@ -37,6 +40,15 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     if !refused && !differs {
         return;
     }
+    // In the other frames the values of now are right.
+    let is_other_edge = is_as_expected && conspicuous(answer.fit.map(|f| f.sigmas));
+    let of_size = answer.fit.filter(|_| differs && !is_other_edge).and_then(|fit| OfSize::new(viewer, fit));
+    let otsu = answer.otsu.filter(|_| refused);
+    let wrong_level = otsu.is_some_and(|o| o.is_better());
+    // General advice follows from the edges, and those of a wrong threshold are not the limb.
+    let tips = answer.report.as_ref().map(hzn_run::explain::tips).unwrap_or_default();
+    let tips: Vec<String> = tips.into_iter().map(Into::into).filter(|_| !wrong_level).collect();
+    let steps = steps_of(viewer, &answer, of_size.as_ref(), if differs { &[] } else { &tips });
     let fill = ui.visuals().faint_bg_color;
     let border = theme::warning(ui.visuals().dark_mode);
     let width = if viewer.focus_diagnosis { 3.0 } else { 1.0 };
@@ -49,34 +61,29 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         }
         // The sensor has not looked at the picture, so the reason is all there is to say.
         if let Err(why) = &answer.report {
-            links::tip(viewer, ui, why);
+            links::tip(viewer, ui, &format!("• {why}"));
             if answer.row.status == Status::NoAltitude {
                 wrapped(ui, NOT_PROCESSED);
             }
         }
-        if let Some(otsu) = answer.otsu.filter(|_| refused) {
+        steps::show(viewer, ui, &steps);
+        if let Some(otsu) = otsu {
             threshold_cause(viewer, ui, &answer, otsu);
         }
-        let wrong_level = answer.otsu.is_some_and(|o| o.answered);
-        match answer.fit.filter(|_| differs) {
-            // In the other frames the values of now are right.
-            Some(fit) if is_as_expected && conspicuous(Some(fit.sigmas)) => wrapped(ui, &only_here(&fit)),
-            Some(fit) => half_angle_causes(viewer, ui, &fit),
-            None if answer.fit.is_none() && !wrong_level && is_as_expected => {
+        match (answer.fit.filter(|_| differs), &of_size) {
+            (Some(fit), _) if is_other_edge => wrapped(ui, &only_here(&fit)),
+            (_, Some(of_size)) => of_size.show(viewer, ui),
+            _ if answer.fit.is_none() && !wrong_level && is_as_expected => {
                 let what = "No edge here fits a limb, and in most other pictures the limb is as expected. The body is \
                             probably out of view, or hidden.";
                 wrapped(ui, what);
             }
-            None => {}
+            _ => {}
         }
-        let tips = answer.report.as_ref().map(hzn_run::explain::tips).unwrap_or_default();
-        // General advice follows from the edges, and those of a wrong threshold are not the limb.
-        if !differs && !wrong_level {
-            tips.iter().for_each(|tip| links::tip(viewer, ui, tip));
-        } else if !tips.is_empty() && !wrong_level {
+        if differs && !tips.is_empty() {
             // The numbers above say more than general advice.
             egui::CollapsingHeader::new(RichText::new("More advice").size(12.5)).show(ui, |ui| {
-                tips.iter().for_each(|tip| links::tip(viewer, ui, tip));
+                tips.iter().for_each(|tip| links::tip(viewer, ui, &format!("• {tip}")));
             });
         }
     });
@@ -85,6 +92,23 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         viewer.focus_diagnosis = !ui.input(|i| i.pointer.any_pressed());
     }
     ui.add_space(4.0);
+}
+
+/// Returns what to do. The threshold comes first, because the limb is not seen without it, then the size of the limb,
+/// then other edges, and general advice last.
+fn steps_of(viewer: &Viewer, answer: &BodyResult, of_size: Option<&OfSize>, tips: &[String]) -> Vec<Step> {
+    let mut steps = Vec::new();
+    let refused = answer.row.status != Status::Ok;
+    if let Some(otsu) = answer.otsu.filter(|otsu| refused && otsu.is_better()) {
+        let now = answer.row.level.unwrap_or(0);
+        steps.push(Step::Otsu(format!("Use Otsu's threshold of {} counts instead of {now}.", otsu.level)));
+    }
+    steps.extend(of_size.map(OfSize::step));
+    if viewer.steady.area.is_some() {
+        steps.push(Step::Say("Mask the edge that does not move: “Mask this” is in the card below.".into()));
+    }
+    steps.extend(tips.iter().cloned().map(Step::Tip));
+    steps
 }
 
 /// Returns true if the pictures with an answer show that the expected half-angle is right.
@@ -106,10 +130,14 @@ fn only_here(fit: &FitFacts) -> String {
 }
 
 /// Compares the threshold with Otsu's.
-fn threshold_cause(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult, otsu: OtsuTrial) {
+fn threshold_cause(viewer: &Viewer, ui: &mut Ui, answer: &BodyResult, otsu: OtsuTrial) {
     let level = answer.row.level.unwrap_or(0);
     let times = f64::from(level) / f64::from(otsu.level.max(1));
-    let outcome = if otsu.answered { "gives an answer" } else { "gives no answer, either" };
+    let outcome = match (otsu.answered, otsu.finds_limb) {
+        (true, _) => "gives an answer",
+        (false, true) => "shows a limb of another size",
+        (false, false) => "gives no answer, either",
+    };
     let now = format!("The threshold in use is {level} counts, {times:.2} times as high.");
     wrapped(ui, &format!("Otsu's threshold, {} counts, {outcome}. {now}", otsu.level));
     let all = viewer.sequence.len();
@@ -118,129 +146,94 @@ fn threshold_cause(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult, otsu: 
     if same > 1 {
         wrapped(ui, &format!("The same holds for {same} of {all} pictures."));
     }
-    let hint = "Sets threshold.method = \"otsu\" and threshold.scale = 1";
-    if otsu.answered && ui.button("Use Otsu's threshold").on_hover_text(hint).clicked() {
-        use_otsu(viewer);
-    }
-}
-
-/// Sets Otsu's threshold without a factor.
-fn use_otsu(viewer: &mut Viewer) {
-    let body = viewer.body;
-    let Some(session) = &mut viewer.session else { return };
-    let name = threshold::Method::Otsu.name();
-    session.set_all(&[("threshold", "method", Some(name.into())), ("threshold", "scale", None)], body);
 }
 
 fn wrapped(ui: &mut Ui, text: &str) {
     ui.add(egui::Label::new(RichText::new(text).size(12.5)).wrap());
 }
 
-/// Draws the fitted and the expected half-angle, and what each possible cause would have to be.
-fn half_angle_causes(viewer: &mut Viewer, ui: &mut Ui, fit: &FitFacts) {
-    let how = if fit.is_trial { "The limb in this picture has the half-angle" } else { "Half-angle of the answer" };
-    wrapped(
-        ui,
-        &format!(
-            "{how} {:.3}°, expected is {:.3}°: {:+.3}°, {:+.1} σ. These values would make them equal:",
-            fit.fitted_deg,
-            fit.expected_deg,
-            fit.fitted_deg - fit.expected_deg,
-            fit.sigmas
-        ),
-    );
-    let consensus = diagnosis::summarise(viewer.rows.fits(viewer.body));
-    let Some(session) = &viewer.session else { return };
-    let Some(config) = session.config().cloned() else { return };
-    let body = viewer.body;
-    let (plausible, impossible): (Vec<_>, Vec<_>) = consensus.iter().partition(|c| is_plausible(c, &config, body));
-    let (mut chosen, mut shift_km) = (None, None);
-    egui::Grid::new("causes").num_columns(5).spacing(vec2(8.0, 3.0)).show(ui, |ui| {
-        for head in ["", "now", "this picture", "all pictures", ""] {
-            ui.weak(RichText::new(head).size(11.5));
-        }
-        ui.end_row();
-        for suspect in in_order(&plausible, &impossible) {
-            let all = consensus.iter().find(|c| c.suspect == suspect);
-            let Some(cause) = Cause::new(suspect, fit, all, &config, body) else { continue };
-            for text in [suspect.name().to_owned(), cause.now.clone(), cause.here.clone()] {
-                ui.label(RichText::new(text).size(12.0));
-            }
-            let all = ui.label(RichText::new(cause.all.clone()).size(12.0));
-            if suspect == Suspect::Altitude {
-                all.on_hover_text("A shift of the altitudes of all pictures");
-            }
-            match cause.shift_km.filter(|_| viewer.sequence.has_altitudes()) {
-                Some(by_km) => try_shift(ui, by_km, &mut shift_km),
-                None => apply(ui, &cause, &mut chosen),
-            }
-            ui.end_row();
-        }
-    });
-    if let Some(by_km) = shift_km {
-        return altitude_trial::shift(viewer, by_km);
-    }
-    let given_km = viewer.sequence.has_altitudes().then_some(viewer.sequence.altitude_shift_km);
-    let of_body = config.each_body().get(body).or(config.each_body().first());
-    let limb_km = of_body.map(|b| [b.limb_height_km, b.limb_height_sigma_km]);
-    let pair = limb_km.and_then(|limb_km| diagnosis::find_pair(viewer.rows.fits(body), limb_km));
-    if let Some(pair) = pair {
-        return two_causes(viewer, ui, &pair, &config);
-    }
-    if let Some(words) = agreement(&plausible, &impossible, given_km) {
-        wrapped(ui, &words);
-    }
-    if let (Some(cure), Some(session)) = (chosen, &mut viewer.session) {
-        let values: Vec<_> = cure.iter().map(|(s, n, x)| (*s, *n, Some(Session::tidy_value(*x)))).collect();
-        session.set_all(&values, body);
-    }
+/// What the half-angles say about altitude, focal length and limb height.
+struct OfSize {
+    fit: FitFacts,
+    config: Arc<Config>,
+    /// What all pictures say, without and with values that no limb has.
+    plausible: Vec<Consensus>,
+    impossible: Vec<Consensus>,
+    pair: Option<Pair>,
+    agreement: Option<Agreement>,
 }
 
-/// Says that two values are wrong, and draws the button that corrects both.
-fn two_causes(viewer: &mut Viewer, ui: &mut Ui, pair: &Pair, config: &Config) {
-    let words = |r: &Remedy| match r.suspect {
-        Suspect::Focal => {
-            let [fx, by] = [r.correction, r.sigma].map(|x| x * config.camera.fx_px);
-            format!("the focal length is {fx:.1} ± {by:.1} px")
-        }
-        other => {
-            let side = if r.correction > 0.0 { "low" } else { "high" };
-            format!("the {} is {:.1} ± {:.1} km too {side}", other.name(), r.correction.abs(), r.sigma)
-        }
-    };
-    let [a, b] = &pair.remedies;
-    let pictures = pair.pictures;
-    let what = format!("Two values are wrong. No single value explains the {pictures} pictures, but two do:");
-    wrapped(ui, &format!("{what} {}, and {}.", words(a), words(b)));
-    let hint = "Corrects both values. Altitudes of frames.csv are shifted on trial, and no file changes.";
-    if !ui.button("Apply both").on_hover_text(hint).clicked() {
-        return;
+impl OfSize {
+    fn new(viewer: &Viewer, fit: FitFacts) -> Option<Self> {
+        let body = viewer.body;
+        let facts = || viewer.rows.fits(body);
+        let config = Arc::clone(viewer.session.as_ref()?.config()?);
+        let all = diagnosis::summarise(facts());
+        let (plausible, impossible): (Vec<_>, Vec<_>) = all.into_iter().partition(|c| is_plausible(c, &config, body));
+        let of_body = config.each_body().get(body).or(config.each_body().first())?;
+        let limb_km = [of_body.limb_height_km, of_body.limb_height_sigma_km];
+        let shift_km = viewer.sequence.has_altitudes().then_some(viewer.sequence.altitude_shift_km);
+        let correlation = |two| diagnosis::correlation(facts(), limb_km[0], two);
+        let agreement = Agreement::new(&plausible, &impossible, shift_km, &correlation);
+        let pair = diagnosis::find_pair(facts(), limb_km);
+        Some(Self { fit, config, plausible, impossible, pair, agreement })
     }
-    let (body, has_altitudes) = (viewer.body, viewer.sequence.has_altitudes());
-    let mut values: Vec<(&str, &str, Option<toml_edit::Value>)> = Vec::new();
-    let mut shift_km = None;
-    if let Some(session) = &viewer.session {
-        let mut set = |section, name, change: &dyn Fn(f64) -> f64| {
-            let now = session.number(section, name, body);
-            values.extend(now.map(|now| (section, name, Some(Session::tidy_value(change(now))))));
+
+    /// Returns what to do about the size of the limb.
+    fn step(&self) -> Step {
+        let Some(pair) = self.pair else {
+            let best = self.agreement.as_ref().map(|agreement| agreement.step.clone());
+            return Step::Say(best.unwrap_or_else(|| {
+                "Correct the value that you know least. The table says what each would have to be.".into()
+            }));
         };
-        for remedy in &pair.remedies {
-            match remedy.suspect {
-                Suspect::Altitude if has_altitudes => shift_km = Some(remedy.correction),
-                Suspect::Altitude => set("body", "altitude_km", &|km| km + remedy.correction),
-                Suspect::LimbHeight => set("body", "limb_height_km", &|km| km + remedy.correction),
-                Suspect::Focal => {
-                    set("camera", "fx_px", &|px| px * remedy.correction);
-                    set("camera", "fy_px", &|px| px * remedy.correction);
-                }
+        let words = format!("Two values are wrong: {}.", diagnosis::two_values(&pair, self.config.camera.fx_px));
+        if pair.is_told_apart() { Step::Both(words, pair) } else { Step::Say(words) }
+    }
+
+    /// Draws the fitted and the expected half-angle, and what each possible cause would have to be.
+    fn show(&self, viewer: &mut Viewer, ui: &mut Ui) {
+        let fit = &self.fit;
+        let how = if fit.is_trial { "The limb in this picture has the half-angle" } else { "Half-angle of the answer" };
+        let by_deg = fit.fitted_deg - fit.expected_deg;
+        let [fitted, expected] = [fit.fitted_deg, fit.expected_deg];
+        let half_angles = format!("{fitted:.3}°, expected is {expected:.3}°: {by_deg:+.3}°, {:+.1} σ", fit.sigmas);
+        wrapped(ui, &format!("{how} {half_angles}. These values would make them equal:"));
+        let body = viewer.body;
+        let (mut chosen, mut shift_km) = (None, None);
+        egui::Grid::new("causes").num_columns(5).spacing(vec2(8.0, 3.0)).show(ui, |ui| {
+            for head in ["", "now", "this picture", "all pictures", ""] {
+                ui.weak(RichText::new(head).size(11.5));
             }
+            ui.end_row();
+            for suspect in in_order(&self.plausible, &self.impossible) {
+                let all = self.plausible.iter().chain(&self.impossible).find(|c| c.suspect == suspect);
+                let Some(cause) = Cause::new(suspect, fit, all, &self.config, body) else { continue };
+                for text in [suspect.name().to_owned(), cause.now.clone(), cause.here.clone()] {
+                    ui.label(RichText::new(text).size(12.0));
+                }
+                let all = ui.label(RichText::new(cause.all.clone()).size(12.0));
+                if suspect == Suspect::Altitude {
+                    all.on_hover_text("A shift of the altitudes of all pictures");
+                }
+                match cause.shift_km.filter(|_| viewer.sequence.has_altitudes()) {
+                    Some(by_km) => try_shift(ui, by_km, &mut shift_km),
+                    None => apply(ui, &cause, &mut chosen),
+                }
+                ui.end_row();
+            }
+        });
+        // Two wrong values make each single one scatter, so that the scatter says nothing.
+        if let Some(agreement) = self.agreement.as_ref().filter(|_| self.pair.is_none()) {
+            wrapped(ui, &agreement.words);
         }
-    }
-    if let Some(session) = &mut viewer.session {
-        session.set_all(&values, body);
-    }
-    if let Some(km) = shift_km {
-        altitude_trial::shift(viewer, km);
+        if let Some(by_km) = shift_km {
+            return altitude_trial::shift(viewer, by_km);
+        }
+        if let (Some(cure), Some(session)) = (chosen, &mut viewer.session) {
+            let values: Vec<_> = cure.iter().map(|(s, n, x)| (*s, *n, Some(Session::tidy_value(*x)))).collect();
+            session.set_all(&values, body);
+        }
     }
 }
 
@@ -286,34 +279,63 @@ fn is_plausible(c: &Consensus, config: &Config, body: usize) -> bool {
     c.suspect != Suspect::LimbHeight || !is_earth || EARTH_LIMB_KM.contains(&c.value)
 }
 
-/// Says which of the plausible causes agrees with all pictures, and names the impossible ones. `shift_km` is the shift
-/// that is on trial, if the frames have altitudes of their own.
-fn agreement(plausible: &[Consensus], impossible: &[Consensus], shift_km: Option<f64>) -> Option<String> {
-    let (best, others) = plausible.split_first()?;
-    if best.pictures < ENOUGH || others.len() + impossible.len() == 0 {
-        return None;
+/// Which of the plausible causes agrees with all pictures.
+struct Agreement {
+    /// The reason in words.
+    words: String,
+    /// What to do.
+    step: String,
+}
+
+impl Agreement {
+    /// Compares the causes. `shift_km` is the shift that is on trial, if the frames have altitudes of their own, and
+    /// `correlation` that of two causes.
+    fn new(
+        plausible: &[Consensus],
+        impossible: &[Consensus],
+        shift_km: Option<f64>,
+        correlation: &dyn Fn([Suspect; 2]) -> Option<f64>,
+    ) -> Option<Self> {
+        let (best, others) = plausible.split_first()?;
+        if best.pictures < ENOUGH || others.len() + impossible.len() == 0 {
+            return None;
+        }
+        let words = |c: &Consensus| format!("{} {:.1}", c.suspect.name(), c.disagreement);
+        let none = |c: &Consensus| format!("{} impossible ({:.0} km)", c.suspect.name(), c.value);
+        let all: Vec<String> = plausible.iter().map(words).chain(impossible.iter().map(none)).collect();
+        let what =
+            format!("The true cause has the same value in every picture. Scatter over {} pictures", best.pictures);
+        let what = format!("{what}, divided by σ: {}; 1 is only noise.", all.join(", "));
+        // A wrong cause scatters more. Below 1 the scatter is the noise of the edges, and says nothing.
+        let scatters = |c: &Consensus| c.disagreement > 2.0 * best.disagreement.max(1.0);
+        if others.iter().all(scatters) {
+            let name = best.suspect.name();
+            let wrong_km = shift_km.filter(|_| best.suspect == Suspect::Altitude).map(|shift| best.value + shift);
+            let where_to = wrong_km.map(|km| {
+                let side = if km < 0.0 { "high" } else { "low" };
+                format!(" The given altitudes are {:.1} km too {side}; correct them where they come from.", km.abs())
+            });
+            let words = format!("{what} So the {name} is the likely cause.{}", where_to.unwrap_or_default());
+            return Some(Self { words, step: format!("Correct the {name}: its row of the table has the button.") });
+        }
+        let open: Vec<Suspect> = plausible.iter().filter(|c| !scatters(c)).map(|c| c.suspect).collect();
+        let names = open.iter().map(|suspect| suspect.name()).collect::<Vec<_>>().join(", ");
+        let pairs = open.iter().enumerate().flat_map(|(i, a)| open.iter().skip(i + 1).map(move |b| [*a, *b]));
+        let alike = |two| {
+            let r = correlation(two).filter(|r| r.abs() > diagnosis::MOST_CORRELATION)?;
+            Some(format!("In these pictures {}.", diagnosis::inseparable(two, r)))
+        };
+        let alike: Vec<String> = pairs.filter_map(alike).collect();
+        let end = if alike.is_empty() {
+            "Each explains the pictures nearly as well. Pictures from other altitudes, or with the limb at other places, \
+             decide."
+                .to_owned()
+        } else {
+            alike.join(" ")
+        };
+        let words = format!("{what} So the cause is one of these: {names}. {end}");
+        Some(Self { words, step: format!("Check these, and correct the one that is wrong: {names}.") })
     }
-    let words = |c: &Consensus| format!("{} {:.1}", c.suspect.name(), c.disagreement);
-    let none = |c: &Consensus| format!("{} impossible ({:.0} km)", c.suspect.name(), c.value);
-    let all: Vec<String> = plausible.iter().map(words).chain(impossible.iter().map(none)).collect();
-    // A wrong cause scatters more. Below 1 the scatter is the noise of the edges, and says nothing.
-    let scatters = |c: &Consensus| c.disagreement > 2.0 * best.disagreement.max(1.0);
-    let end = if others.iter().all(scatters) {
-        let wrong_km = shift_km.filter(|_| best.suspect == Suspect::Altitude).map(|shift| best.value + shift);
-        let where_to = wrong_km.map(|km| {
-            let side = if km < 0.0 { "high" } else { "low" };
-            format!(" The given altitudes are {:.1} km too {side}; correct them where they come from.", km.abs())
-        });
-        format!("So the {} is the likely cause.{}", best.suspect.name(), where_to.unwrap_or_default())
-    } else {
-        let names: Vec<&str> = plausible.iter().filter(|c| !scatters(c)).map(|c| c.suspect.name()).collect();
-        format!(
-            "So the cause is one of these: {}. The pictures do not tell them apart; check the one that you know least.",
-            names.join(", ")
-        )
-    };
-    let what = format!("The true cause has the same value in every picture. Scatter over {} pictures", best.pictures);
-    Some(format!("{what}, divided by σ: {}; 1 is only noise. {end}", all.join(", ")))
 }
 
 /// One possible cause in words, with its cure.

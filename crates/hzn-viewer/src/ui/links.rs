@@ -6,9 +6,9 @@ use hzn_files::keys;
 use super::panels::Panel;
 use super::viewer::Viewer;
 
-/// Draws an advice with a link for each key that it names.
+/// Draws an advice, which begins with its mark or number, with a link for each key that it names.
 pub(super) fn tip(viewer: &mut Viewer, ui: &mut Ui, tip: &str) {
-    ui.add(egui::Label::new(RichText::new(format!("• {tip}")).size(12.5)).wrap());
+    ui.add(egui::Label::new(RichText::new(tip).size(12.5)).wrap());
     let named = named_keys(tip);
     if named.is_empty() {
         return;

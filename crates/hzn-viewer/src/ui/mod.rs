@@ -43,6 +43,7 @@ mod space_view;
 mod stages;
 mod steady_edge;
 mod steady_offer;
+mod steps;
 mod study;
 mod study_window;
 mod summary;

@@ -27,7 +27,7 @@ use super::residuals::{Residual, ellipse, residuals};
 use super::trials::{OtsuTrial, Trials};
 use super::{coast, ground};
 use crate::model::cause::Cause;
-use crate::model::diagnosis::{FitFacts, find_fit};
+use crate::model::diagnosis::FitFacts;
 use crate::model::view::Point;
 use crate::model::{Entry, Histogram, Processed};
 
@@ -389,11 +389,13 @@ fn add_causes(
         if wrong_level {
             continue;
         }
-        let trial = || trials.try_any_cone(view, input.data);
-        let Some((fit, solution)) = find_fit(&body.edges, report, body.row.altitude_km, camera, trial) else {
-            continue;
-        };
+        let found = trials.find_fit(&body.edges, report, body.row.altitude_km, camera, (view, input.data));
+        let Some((fit, solution, needs_otsu)) = found else { continue };
         body.fit = Some(fit);
+        if let Some(otsu) = body.otsu.as_mut().filter(|_| needs_otsu) {
+            otsu.finds_limb = true;
+            body.cause = Some(Cause::from_report(report, true));
+        }
         if fit.is_trial {
             body.trial_limb = free_limb(&solution, camera);
         }

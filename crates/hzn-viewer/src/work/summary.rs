@@ -10,7 +10,6 @@ use super::frame_view::FrameInput;
 use super::trials::Trials;
 use crate::model::Processed;
 use crate::model::cause::Cause;
-use crate::model::diagnosis::find_fit;
 use crate::model::sigma_parts::SigmaParts;
 use crate::model::steady_edge::EdgeCells;
 
@@ -48,11 +47,13 @@ pub(super) fn summarise(
             continue;
         };
         let answered = otsu.get(index).is_some_and(|o| o.answered);
-        processed.causes.push(Cause::from_report(report, answered));
-        let trial = || trials.try_any_cone(view, input.data);
         // The edge of a wrong threshold is not the limb.
-        let fit = (!answered).then(|| find_fit(&trace.edges(), report, row.altitude_km, &camera, trial)).flatten();
-        processed.fits.push(fit.map(|(facts, _)| facts));
+        let find =
+            |trials: &mut Trials| trials.find_fit(&trace.edges(), report, row.altitude_km, &camera, (view, input.data));
+        let fit = if answered { None } else { find(&mut *trials) };
+        let needs_otsu = fit.as_ref().is_some_and(|(_, _, needs_otsu)| *needs_otsu);
+        processed.causes.push(Cause::from_report(report, answered || needs_otsu));
+        processed.fits.push(fit.map(|(facts, _, _)| facts));
         let parts = report.solution.as_ref().and_then(|s| SigmaParts::of_answer(s, &trace.edges()));
         processed.sigma_parts.push(parts);
     }

@@ -180,8 +180,8 @@ impl Viewer {
         // A form or a path that is still being entered belongs to the old pictures.
         self.wizard = None;
         self.cancel_save();
-        self.path_dialog.take_if(|dialog| dialog.purpose.writes());
         (self.changes.agreed, self.changes.is_sensor_kept) = (None, false);
+        self.path_dialog.take_if(|dialog| dialog.purpose.writes());
         // A sensor that is compared belongs to the old pictures, too.
         self.other = None;
         let is_named = self.request.sensor.is_some();
@@ -196,8 +196,8 @@ impl Viewer {
         } else if let Some(session) = kept {
             let home = autosave::absolute(session.home());
             self.session = Some(session);
-            self.add_note(format!("There is no sensor.toml. The one that you opened stays: {}", home.display()));
             self.changes.is_sensor_kept = true;
+            self.add_note(format!("There is no sensor.toml. The one that you opened stays: {}", home.display()));
         } else {
             self.add_note(
                 "There is no sensor.toml, so the pictures are shown but not processed. Make one in the panel \
