@@ -4,6 +4,10 @@
 //! pair of corrections does: the difference of the half-angles of picture i is Σ s_ik x_k, where s_ik says by how much
 //! one unit of the correction x_k changes it. Weighted least squares over all pictures gives the corrections. The
 //! weights fall with the residual (least absolute deviations by iteration), because some fits may be of clouds.
+//!
+//! A half-angle α is no line over the altitude H: sin α = (R + h)/(R + H) for a limb at the height h. The altitude that
+//! one picture implies alone is far from the right one if a focal length is wrong, too, so that a slope through it is
+//! wrong by a tenth. Each solution therefore gives new slopes, up to its own corrections.
 
 use super::facts::{FitFacts, Suspect};
 
@@ -60,10 +64,50 @@ fn least_gain(freedom: usize) -> f64 {
     (z + first + second).powi(2)
 }
 
+/// Number of times that the slopes are taken again at the corrections of the last solution.
+const RENEWALS: usize = 4;
+/// Smallest correction that a slope is taken over, km. Below, the curve is a line.
+const LEAST_KM: f64 = 0.1;
+
+/// The half-angle of one picture over the altitude and the limb height.
+#[derive(Debug, Clone, Copy)]
+struct Curve {
+    /// Distances of limb and camera from the centre of the body as the picture was processed, km.
+    limb_km: f64,
+    camera_km: f64,
+}
+
+impl Curve {
+    /// Returns the curve through the expected half-angle at the given altitude and the fitted one at the altitude that
+    /// it implies, which say the radius of the body.
+    fn new(facts: &FitFacts) -> Option<Self> {
+        let [expected, fitted] = [facts.expected_deg, facts.fitted_deg].map(|deg| deg.to_radians().sin());
+        let (given_km, implied_km) = (facts.given_altitude_km?, facts.altitude_km?.value);
+        let radius_km = (fitted * implied_km - expected * given_km) / (expected - fitted);
+        let camera_km = radius_km + given_km;
+        (radius_km.is_finite() && radius_km > 0.0).then_some(Self { limb_km: expected * camera_km, camera_km })
+    }
+
+    /// Returns the slopes over the altitude and the limb height up to these corrections, in degrees per km. Their sum
+    /// over both corrections is the change of the half-angle.
+    fn slopes(&self, [altitude_km, limb_km]: [f64; 2]) -> Option<[f64; 2]> {
+        let far = |km: f64| if km.abs() < LEAST_KM { LEAST_KM } else { km };
+        let (by_altitude, by_limb) = (far(altitude_km), far(limb_km));
+        let deg = |up: f64, limb: f64| ((self.limb_km + limb) / (self.camera_km + up)).asin().to_degrees();
+        let higher = deg(by_altitude, 0.0);
+        let slopes =
+            [(higher - deg(0.0, 0.0)) / by_altitude, (deg(altitude_km, by_limb) - deg(altitude_km, 0.0)) / by_limb];
+        slopes.iter().all(|slope| slope.is_finite()).then_some(slopes)
+    }
+}
+
 /// The difference of the half-angles of one picture over its 1-sigma, and its change by one unit of each correction.
+#[derive(Debug, Clone)]
 struct Equation {
     difference: f64,
     slopes: [f64; 3],
+    sigma_deg: f64,
+    curve: Option<Curve>,
 }
 
 impl Equation {
@@ -91,7 +135,18 @@ impl Equation {
         };
         let [altitude, focal, limb] = Suspect::ALL.map(slope);
         let slopes = [altitude?, focal?, limb?];
-        difference.is_finite().then_some(Self { difference, slopes })
+        let curve = Curve::new(facts);
+        difference.is_finite().then_some(Self { difference, slopes, sigma_deg: sigma, curve })
+    }
+
+    /// Returns the equation with the slopes up to these corrections of altitude and limb height, in km.
+    fn renewed(&self, corrections_km: [f64; 2]) -> Self {
+        let [altitude, focal, limb] = self.slopes;
+        let of_curve = self.curve.and_then(|curve| curve.slopes(corrections_km));
+        let slopes = of_curve.map_or([altitude, focal, limb], |[altitude, limb]| {
+            [altitude / self.sigma_deg, focal, limb / self.sigma_deg]
+        });
+        Self { slopes, ..self.clone() }
     }
 }
 
@@ -106,6 +161,21 @@ struct Solved {
 impl Solved {
     /// Solves for the quantities `which`; two equal ones are one.
     fn new(equations: &[Equation], which: [usize; 2]) -> Option<Self> {
+        let mut solved = Self::on_lines(equations, which)?;
+        for _ in 0..RENEWALS {
+            let of = |suspect: Suspect| {
+                let place = which.iter().position(|k| Suspect::ALL.get(*k) == Some(&suspect));
+                place.map_or(0.0, |i| solved.corrections[i])
+            };
+            let corrections_km = [of(Suspect::Altitude), of(Suspect::LimbHeight)];
+            let renewed: Vec<Equation> = equations.iter().map(|e| e.renewed(corrections_km)).collect();
+            solved = Self::on_lines(&renewed, which)?;
+        }
+        Some(solved)
+    }
+
+    /// Solves with the slopes of the equations.
+    fn on_lines(equations: &[Equation], which: [usize; 2]) -> Option<Self> {
         let single = which[0] == which[1];
         let mut weights = vec![1.0; equations.len()];
         let (mut x, mut inverse, mut residuals) = ([0.0; 2], [[0.0; 2]; 2], Vec::new());
@@ -256,11 +326,13 @@ mod tests {
         let fitted = half_angle(altitude_km + km) + bend * focal.ln() + noise * NOISE_DEG;
         let difference = fitted - expected;
         let implied = |slope: f64| Implied { value: difference / slope, sigma: (NOISE_DEG / slope).abs() };
-        let altitude = implied(by_km);
         let ln_focal = implied(bend);
         let factor = ln_focal.value.exp();
+        let sin = fitted.to_radians().sin();
+        let altitude = Implied { value: (radius + 10.0) / sin - radius, sigma: (NOISE_DEG / by_km).abs() };
         // One km of limb is about one km of altitude less, near the ground.
-        let limb = implied(-by_km * radius / (radius + altitude_km));
+        let limb_km = sin * (radius + altitude_km) - radius;
+        let limb = Implied { value: limb_km, sigma: altitude.sigma * (radius + altitude_km) / radius };
         FitFacts {
             expected_deg: expected,
             fitted_deg: fitted,
@@ -269,9 +341,9 @@ mod tests {
             sigmas: difference / 0.3,
             is_trial: true,
             given_altitude_km: Some(altitude_km),
-            altitude_km: Some(Implied { value: altitude_km + altitude.value, sigma: altitude.sigma }),
+            altitude_km: Some(altitude),
             focal_factor: Some(Implied { value: factor, sigma: ln_focal.sigma * factor }),
-            limb_height_km: Some(Implied { value: 10.0 + limb.value, sigma: limb.sigma }),
+            limb_height_km: Some(limb),
         }
     }
 
@@ -317,6 +389,17 @@ mod tests {
         let limb = [Suspect::Altitude, Suspect::LimbHeight];
         assert!(correlation(flight(-20.0, 1.0).iter(), LIMB_KM[0], limb).unwrap().abs() > MOST_CORRELATION);
         assert_eq!(correlation(flight(-20.0, 1.0)[..2].iter(), LIMB_KM[0], limb), None);
+    }
+
+    /// The slopes through what each picture implies alone were wrong by up to 5 km here.
+    #[test]
+    fn large_corrections_follow_the_curve_of_the_half_angle() {
+        for (km, focal) in [(-45.0, 1.1), (40.0, 0.92), (35.0, 1.08), (-40.0, 0.9)] {
+            let pair = find_pair(flight(km, focal).iter(), LIMB_KM).unwrap();
+            let [altitude, factor] = pair.remedies;
+            assert!((altitude.correction - km).abs() < 1.0, "{km} km, {focal}: {altitude:?}");
+            assert!((factor.correction / focal - 1.0).abs() < 0.002, "{km} km, {focal}: {factor:?}");
+        }
     }
 
     #[test]

@@ -41,8 +41,8 @@ pub fn longest_verdict(report: &Report<f64>) -> Option<Verdict> {
 }
 
 impl Cause {
-    /// Returns the cause of a result. `otsu_is_better` is true if Otsu's threshold, which is not in use, gives an answer
-    /// or shows a limb of another size.
+    /// Returns the cause of a result. `otsu_is_better` is true if Otsu's threshold, which is not in use, gives an
+    /// answer or shows a limb of another size.
     pub fn from_report(report: &Report<f64>, otsu_is_better: bool) -> Self {
         let reason = match report.status {
             Status::Ok => None,

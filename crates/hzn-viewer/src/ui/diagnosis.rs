@@ -327,8 +327,8 @@ impl Agreement {
         };
         let alike: Vec<String> = pairs.filter_map(alike).collect();
         let end = if alike.is_empty() {
-            "Each explains the pictures nearly as well. Pictures from other altitudes, or with the limb at other places, \
-             decide."
+            "Each explains the pictures nearly as well. Pictures from other altitudes, or with the limb at other \
+             places, decide."
                 .to_owned()
         } else {
             alike.join(" ")

@@ -20,7 +20,8 @@ pub(super) enum Step {
     Tip(String),
 }
 
-/// Draws the list. An earlier step can change what the later ones say, so that the list begins with what hides the rest.
+/// Draws the list. An earlier step can change what the later ones say, so that the list begins with what hides the
+/// rest.
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui, steps: &[Step]) {
     if steps.is_empty() {
         return;

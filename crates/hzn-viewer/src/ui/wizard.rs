@@ -8,8 +8,8 @@ use super::wizard_form::{FocalFrom, Wizard};
 use super::{number, theme};
 
 /// What the form says before the limb is measured.
-const FROM_LIMB: &str = "The limb in the pictures says lens and field of view, if the altitude is right. This takes some \
-                         seconds.";
+const FROM_LIMB: &str = "The limb in the pictures says lens and field of view, if the altitude is right. This takes \
+                         some seconds.";
 
 pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context) {
     let Some(mut wizard) = viewer.wizard.take() else { return };

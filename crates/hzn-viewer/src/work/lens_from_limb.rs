@@ -28,7 +28,8 @@ pub struct LensFromLimb {
 }
 
 impl LensFromLimb {
-    /// Starts the measurement in the pictures of `request`; `known` says altitude and body. `wake` is called at its end.
+    /// Starts the measurement in the pictures of `request`; `known` says altitude and body. `wake` is called at its
+    /// end.
     pub fn start(request: Request, known: CameraFacts, wake: &Wake) -> Self {
         let (send, end) = bounded(1);
         let wake = Arc::clone(wake);

@@ -113,8 +113,8 @@ impl Trials {
         found.iter().map(|p| p.report.as_ref().ok().map(trial)).collect()
     }
 
-    /// Returns the longest edge that a cone of any half-angle fits. With Otsu's threshold it is looked for only where the
-    /// threshold in use shows none.
+    /// Returns the longest edge that a cone of any half-angle fits. With Otsu's threshold it is looked for only where
+    /// the threshold in use shows none.
     pub fn try_any_cone(&mut self, view: &ImageView<'_>, data: Option<&FrameData>) -> Option<ConeTrial> {
         if let Some(edge) = self.any_cone.find(view, data) {
             return Some(ConeTrial { edge, needs_otsu: false });
