@@ -148,6 +148,41 @@ pub fn misses_truth(row: &Row, truth: Option<&Truth>) -> bool {
     error_sigmas(row, truth).is_some_and(|sigmas| sigmas > 3.0)
 }
 
+/// An RMS of the residuals that is this many times as large as expected is marked. The RMS of many points hardly
+/// scatters, so that a larger one is another edge, a wrong lens, or clouds.
+const MOST_RMS: f64 = 3.0;
+
+/// The RMS of residuals that is expected of an answer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ExpectedRms {
+    /// sensor.toml tells it (`covariance.sigma_px`), px.
+    Told(f64),
+    /// The median of all answers, px: a noise that is a default says nothing about the camera.
+    Typical(f64),
+}
+
+impl ExpectedRms {
+    /// Returns the told one, or else that of these results; `None` without answers.
+    pub fn new<'a>(told_px: Option<f64>, rows: impl Iterator<Item = &'a Row>) -> Option<Self> {
+        if let Some(px) = told_px {
+            return Some(Self::Told(px));
+        }
+        let mut all: Vec<f64> = rows.filter_map(|row| row.rms_px.filter(|_| row.axis().is_some())).collect();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied().map(Self::Typical)
+    }
+
+    /// Says that the RMS of an answer is too large; `None` if it is not.
+    pub fn exceeded_by(self, row: &Row) -> Option<String> {
+        let (expected_px, whose) = match self {
+            Self::Told(px) => (px, "that sensor.toml tells"),
+            Self::Typical(px) => (px, "that are usual in these pictures"),
+        };
+        let times = row.rms_px.filter(|_| row.axis().is_some())? / expected_px;
+        (times > MOST_RMS).then(|| format!("The RMS is {times:.1} times the {expected_px:.2} px {whose}."))
+    }
+}
+
 /// Returns the angle between two directions, in degrees. It is also accurate for small angles.
 pub fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
     let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -202,6 +237,25 @@ mod tests {
         assert_eq!(altitude_sigmas(&row, None), None);
         (row.altitude_est_km, row.altitude_est_sigma_km) = (Some(228.0), Some(4.0));
         assert_eq!(altitude_sigmas(&row, None), Some(-3.0));
+    }
+
+    #[test]
+    fn an_rms_is_compared_with_the_told_noise_or_with_other_answers() {
+        let row = |rms_px| {
+            let meta =
+                hzn_mcap::RowMeta { index: 0, file: "a".into(), time_s: None, body: "earth".into(), altitude_km: None };
+            let mut row = Row::unprocessed(&meta, hzn_core::status::Status::Ok, "");
+            (row.axis_x, row.axis_y, row.axis_z, row.rms_px) = (Some(0.0), Some(0.0), Some(1.0), Some(rms_px));
+            row
+        };
+        let all = [row(0.3), row(0.35), row(1.2)];
+        let typical = ExpectedRms::new(None, all.iter()).unwrap();
+        assert_eq!(typical, ExpectedRms::Typical(0.35));
+        assert!(typical.exceeded_by(&all[2]).unwrap().contains("3.4 times the 0.35 px that are usual"));
+        assert_eq!(typical.exceeded_by(&all[0]), None);
+        let told = ExpectedRms::new(Some(0.1), all.iter()).unwrap();
+        assert!(told.exceeded_by(&all[1]).unwrap().contains("3.5 times the 0.10 px that sensor.toml tells"));
+        assert_eq!(ExpectedRms::new(None, [].iter()), None);
     }
 
     #[test]

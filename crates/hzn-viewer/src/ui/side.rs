@@ -81,7 +81,10 @@ fn say_status(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, answer: 
     let truth = row.and_then(|row| viewer.truth_of(&frame_view.name, &row.body));
     let sigmas = row.and_then(|row| quantity::error_sigmas(row, truth));
     let misses = row.is_some_and(|row| quantity::misses_truth(row, truth));
-    badge(ui, status.name(), if misses { theme::MISSED } else { theme::status(status) });
+    let high_rms = row.zip(viewer.missed.expected_rms).and_then(|(row, expected)| expected.exceeded_by(row));
+    let is_conspicuous = misses || high_rms.is_some();
+    badge(ui, status.name(), if is_conspicuous { theme::MISSED } else { theme::status(status) });
+    high_rms.iter().for_each(|line| small(ui, line));
     if let Some(sigmas) = sigmas.filter(|_| misses) {
         small(ui, &format!("The error is {sigmas:.1} σ: the truth lies outside of 3σ."));
     }

@@ -1,11 +1,13 @@
-//! Counts of the pictures by status and reason, and the answers that miss the truth, kept until the results change.
+//! Counts of the pictures by status and reason, and the answers that are conspicuous, kept until the results change.
 
 use std::collections::HashMap;
 
 use hzn_files::truth::Truth;
 
 use crate::model::cause::{self, Counted};
-use crate::model::{ResultHistory, quantity};
+use crate::model::quantity::{self, ExpectedRms};
+use crate::model::sheet::Key;
+use crate::model::{ResultHistory, Session};
 
 /// Counts that are kept until the results change.
 #[derive(Debug, Default)]
@@ -26,11 +28,14 @@ impl Summary {
     }
 }
 
-/// Pictures whose answer misses the truth by more than its 3-sigma, kept until the results change.
+/// Pictures whose answer misses the truth by more than its 3-sigma, or whose residuals are too large, kept until the
+/// results change.
 #[derive(Debug, Default)]
 pub(super) struct Missed {
-    of: Option<(u64, usize, usize)>,
+    of: Option<(u64, usize, usize, u64)>,
     pictures: Vec<usize>,
+    /// The RMS that the residuals of an answer should have.
+    pub(super) expected_rms: Option<ExpectedRms>,
 }
 
 impl Missed {
@@ -39,14 +44,24 @@ impl Missed {
         &mut self,
         rows: &ResultHistory,
         truth: &HashMap<String, Vec<Truth>>,
+        session: Option<&Session>,
         body: usize,
     ) -> &[usize] {
-        let key = (rows.generation(), truth.len(), body);
+        let key = (rows.generation(), truth.len(), body, session.map_or(0, Session::version));
         if self.of != Some(key) {
             self.of = Some(key);
             let of_row = |row: &hzn_mcap::Row| truth.get(&row.file)?.iter().find(|t| t.body == row.body);
-            let misses = |i: &usize| rows.newest(*i, body).is_some_and(|row| quantity::misses_truth(row, of_row(row)));
-            self.pictures = (0..rows.len()).filter(misses).collect();
+            let (section, name) = ("covariance", "sigma_px");
+            let is_told = |s: &&Session| s.sheet().get(Key { section, name, body }).is_some();
+            let told_px = session.filter(is_told).and_then(|s| s.number(section, name, body));
+            let all = (0..rows.len()).filter_map(|i| rows.newest(i, body));
+            let expected = ExpectedRms::new(told_px, all);
+            let is_conspicuous = |row: &hzn_mcap::Row| {
+                quantity::misses_truth(row, of_row(row)) || expected.is_some_and(|rms| rms.exceeded_by(row).is_some())
+            };
+            let marked = |i: &usize| rows.newest(*i, body).is_some_and(is_conspicuous);
+            self.pictures = (0..rows.len()).filter(marked).collect();
+            self.expected_rms = expected;
         }
         &self.pictures
     }

@@ -13,7 +13,7 @@ pub(super) const REJECTED: Color32 = Color32::from_rgb(213, 94, 0);
 pub(super) const AXIS: Color32 = Color32::from_rgb(230, 140, 190);
 /// The truth.
 pub(super) const TRUTH: Color32 = Color32::from_rgb(230, 159, 0);
-/// An answer that misses the truth by more than its 3-sigma.
+/// An answer that misses the truth by more than its 3-sigma, or whose residuals are too large.
 pub(super) const MISSED: Color32 = Color32::from_rgb(230, 159, 0);
 /// Residuals of a lens calibration.
 pub(super) const LENS: Color32 = Color32::from_rgb(86, 180, 233);

@@ -247,7 +247,7 @@ fn strip(viewer: &mut Viewer, ui: &mut Ui) {
     for index in &viewer.damaged {
         places.mark(&painter, band, *index, theme::status(Status::Unreadable));
     }
-    for index in viewer.missed.update(&viewer.rows, &viewer.truth, viewer.body) {
+    for index in viewer.missed.update(&viewer.rows, &viewer.truth, viewer.session.as_ref(), viewer.body) {
         places.mark(&painter, band, *index, theme::MISSED);
     }
     cursor(viewer, ui, &painter, &response, band, &places);

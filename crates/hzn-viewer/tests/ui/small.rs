@@ -77,6 +77,38 @@ fn the_worst_answer_is_marked_and_no_refused_picture_is_worst() {
 }
 
 #[test]
+fn an_answer_with_large_residuals_is_marked() {
+    let (_dir, pictures) = folder();
+    // Every other column of one picture lies a pixel lower.
+    let even = image::open(pictures.join("1.png")).unwrap().into_luma8();
+    let jagged = image::GrayImage::from_fn(WIDTH.into(), HEIGHT.into(), |x, y| {
+        *even.get_pixel(x, y.saturating_sub(if x / 8 % 2 == 0 { 1 } else { 0 }))
+    });
+    jagged.save(pictures.join("1.png")).unwrap();
+    let mut window = window_on(&pictures);
+    until(&mut window, "not processed", |v| v.processed() == 4 && !v.is_working());
+    let words = "that are usual in these pictures";
+    assert!(!shows(&window, words));
+    window.key_press(Key::ArrowRight);
+    settled(&mut window);
+    window.run_steps(2);
+    assert_eq!(answer(&window).0, Status::Ok);
+    assert!(shows(&window, words), "{:?}", frame_view(&window).answers[0].bodies[0].row.rms_px);
+    // The noise that sensor.toml tells counts more than the other pictures.
+    let told = SENSOR.to_owned() + "\n[covariance]\nsigma_px = 0.6\n";
+    window.state_mut().session_mut().unwrap().set_text(&told);
+    settled(&mut window);
+    window.run_steps(3);
+    assert_eq!(answer(&window).0, Status::Ok);
+    assert!(!shows(&window, words) && !shows(&window, "that sensor.toml tells"));
+    let told = told.replace("sigma_px = 0.6", "sigma_px = 0.05");
+    window.state_mut().session_mut().unwrap().set_text(&told);
+    settled(&mut window);
+    window.run_steps(3);
+    assert!(shows(&window, "that sensor.toml tells"));
+}
+
+#[test]
 fn settings_are_kept_when_the_window_is_killed() {
     let (dir, pictures) = folder();
     let store = dir.path().join("config").join("viewer.json");
