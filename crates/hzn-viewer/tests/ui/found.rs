@@ -344,6 +344,14 @@ fn the_picture_keeps_most_of_a_small_window() {
         window.run_steps(4);
         assert!(window.query_by_label("preset").is_some(), "the stages open over the picture");
         assert_eq!(window.get_by_label("Picture 0.png").rect(), rect);
+        window.key_press(Key::S);
+        window.run_steps(4);
+        // A picture without an answer has a link to its diagnosis, which opens them, too.
+        window.state_mut().go(3);
+        settled(&mut window);
+        window.get_by_label("Why, and what to do").click_accesskit();
+        window.run_steps(6);
+        assert!(window.query_by_label("Diagnosis").is_some(), "{width}×{height}");
     }
 }
 

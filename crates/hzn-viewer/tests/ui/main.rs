@@ -4,6 +4,7 @@ mod calibrate;
 mod causes;
 mod clear;
 mod companions;
+mod drawn;
 mod exports;
 mod first_sensor;
 mod found;

@@ -290,7 +290,10 @@ fn a_parameter_is_swept_and_a_click_takes_a_value() {
     let name = window.get_by_role_and_label(egui::accesskit::Role::Label, "scale").rect();
     click_with(&mut window, name.left_center() + egui::vec2(4.0, 0.0), PointerButton::Secondary);
     window.get_by_label("Sweep threshold.scale over the sequence…").click();
-    window.run_steps(3);
+    window.run_steps(6);
+    let picture = window.get_by_label("Picture 0.png").rect();
+    let sweep = window.get_by_role_and_label(egui::Role::Window, "Sweep of threshold.scale").rect();
+    assert!(picture.contains(sweep.left_top()), "it opens over no menu and no answer: {sweep:?} {picture:?}");
     window.get_by_label("Start").click();
     for _ in 0..3000 {
         window.step();
