@@ -7,7 +7,7 @@
 //!
 //! A half-angle α is no line over the altitude H: sin α = (R + h)/(R + H) for a limb at the height h. The altitude that
 //! one picture implies alone is far from the right one if a focal length is wrong, too, so that a slope through it is
-//! wrong by a tenth. Each solution therefore gives new slopes, up to its own corrections.
+//! wrong. Each solution therefore gives new slopes, up to its own corrections.
 
 use super::facts::{FitFacts, Suspect};
 
@@ -391,14 +391,14 @@ mod tests {
         assert_eq!(correlation(flight(-20.0, 1.0)[..2].iter(), LIMB_KM[0], limb), None);
     }
 
-    /// The slopes through what each picture implies alone were wrong by up to 5 km here.
+    /// With slopes through what each picture implies alone, the errors are up to 0.5 km and 0.6 % here.
     #[test]
     fn large_corrections_follow_the_curve_of_the_half_angle() {
         for (km, focal) in [(-45.0, 1.1), (40.0, 0.92), (35.0, 1.08), (-40.0, 0.9)] {
             let pair = find_pair(flight(km, focal).iter(), LIMB_KM).unwrap();
             let [altitude, factor] = pair.remedies;
-            assert!((altitude.correction - km).abs() < 1.0, "{km} km, {focal}: {altitude:?}");
-            assert!((factor.correction / focal - 1.0).abs() < 0.002, "{km} km, {focal}: {factor:?}");
+            assert!((altitude.correction - km).abs() < 0.3, "{km} km, {focal}: {altitude:?}");
+            assert!((factor.correction / focal - 1.0).abs() < 0.001, "{km} km, {focal}: {factor:?}");
         }
     }
 
