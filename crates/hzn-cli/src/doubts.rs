@@ -28,6 +28,7 @@ pub(crate) use rates::{Answer, Rates};
 pub(crate) use refused::Refused;
 pub(crate) use repeats::Repeats;
 pub(crate) use shutter::Shutter;
+pub(crate) use spread::Spread;
 pub(crate) use told_sun::ToldSun;
 
 use crate::tell;

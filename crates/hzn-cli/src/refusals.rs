@@ -9,6 +9,8 @@ use hzn_run::engine::Finished;
 use hzn_run::explain;
 pub(crate) use hzn_run::provenance::quoted;
 
+use crate::doubts::Spread;
+
 /// The reason why a body was not found in a picture: the verdict on the best candidate, or the status if there is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Why {
@@ -26,6 +28,17 @@ impl Why {
         Some(best.map_or(Self::Status(report.status), |c| Self::Verdict(c.verdict)))
     }
 
+    /// Returns whether the body may have another size than expected.
+    fn is_size(self) -> bool {
+        matches!(self, Self::Verdict(Verdict::HalfAngle | Verdict::NoConsensus | Verdict::FewInliers))
+    }
+
+    /// Returns whether a body of another size may be the reason. The picture of such a body also lacks an edge along a
+    /// part of the limb that is expected.
+    fn may_be_size(self) -> bool {
+        self.is_size() || self == Self::Verdict(Verdict::Unsupported)
+    }
+
     fn text(self, limits: &gates::Config) -> String {
         match self {
             Self::Verdict(verdict) => format!("{}: {}", verdict.name(), explain::verdict_text(verdict, limits)),
@@ -41,10 +54,15 @@ pub(crate) struct Refusals {
     further: u64,
     each: Vec<Reason>,
     total: u64,
+    /// Numbers of pictures whose body may have another size than expected.
+    of_size: Spread<u64>,
 }
 
 /// Most pictures with one reason that are kept to look at again.
 const MAX_KEPT: usize = 5;
+/// Most pictures that are looked at for two wrong values: twice as many as are needed, because some show clouds. Each
+/// takes a few tenths of a second.
+const MOST_OF_SIZE: usize = 16;
 
 /// A reason with its count.
 #[derive(Debug)]
@@ -73,8 +91,10 @@ impl Refusals {
         let first_here = frame.outcomes.iter().all(|f| f.report.is_ok()).then_some(frame.index);
         let is_further = |report: &Report<f64>| report.status == Status::Ok && report.counters.looks > 1;
         self.further += frame.outcomes.iter().filter(|f| f.report.as_ref().is_ok_and(is_further)).count() as u64;
+        let mut may_be_size = false;
         for why in frame.outcomes.iter().filter_map(|f| Why::from_report(f.report.as_ref().ok()?)) {
             self.total += 1;
+            may_be_size |= why.may_be_size();
             match self.each.iter_mut().find(|known| known.why == why) {
                 Some(known) => {
                     known.count += 1;
@@ -83,6 +103,14 @@ impl Refusals {
                 None => self.each.push(Reason { why, count: 1, first: first_here.into_iter().collect() }),
             }
         }
+        first_here.filter(|_| may_be_size).into_iter().for_each(|index| self.of_size.add(index));
+    }
+
+    /// Returns the numbers of some pictures whose body may have another size than expected, evenly spread over the run.
+    pub(crate) fn of_size(&self) -> Vec<u64> {
+        let all = self.of_size.choose(Some);
+        let step = all.len().div_ceil(MOST_OF_SIZE).max(1);
+        all.into_iter().step_by(step).collect()
     }
 
     /// Returns the number of answers from further looks, in words; `None` if there are none.
@@ -102,7 +130,7 @@ impl Refusals {
             text: format!("{} refused, {share} as {}", self.total, why.text(limits)),
             pictures: first,
             is_edge: matches!(why, Why::Verdict(_)),
-            is_size: matches!(why, Why::Verdict(Verdict::HalfAngle | Verdict::NoConsensus | Verdict::FewInliers)),
+            is_size: why.is_size(),
         })
     }
 }

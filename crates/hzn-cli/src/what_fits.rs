@@ -34,6 +34,8 @@ pub(crate) struct Again {
     pub(crate) fits: Option<WhatFits>,
 }
 
+/// Fewest pictures that can show two wrong values ([`diagnosis::find_pair`]); a look at fewer is in vain.
+const FEWEST_FOR_TWO: usize = 8;
 /// 1-sigma of an attitude whose cell is empty, degrees.
 const ATTITUDE_SIGMA_DEG: f64 = 5.0;
 
@@ -216,19 +218,40 @@ impl ReadAgain {
     /// Looks for a limb of any size, and says what would fit the median of the pictures. `None` if no picture shows a
     /// limb, or if those that do show one of the expected size.
     pub(crate) fn what_fits(&self, request: &Request, config: &Config) -> Option<WhatFits> {
-        let mut trial = AnyCone::new(config, request.flight).ok()?;
         let camera = Camera::try_new(&config.camera).ok()?;
-        let mut found: Vec<FitFacts> = Vec::new();
-        for Look { picture, data, .. } in &self.each {
-            let Ok(view) = picture.view(config.input.channel) else { continue };
-            found.extend(diagnosis::find_misfit(&mut trial, config, &view, data.as_ref()));
-        }
+        let mut found = self.any_fits(request, config)?;
+        found.retain(|fit| diagnosis::is_misfit(fit, config));
         let fits = diagnosis::what_fits(&diagnosis::median_fit(&found)?, &camera, config.camera.width);
         let text = match (self.each.as_slice(), found.len()) {
             ([Look { name, .. }], _) => format!("in {name} {fits}"),
             (each, n) => format!("in {n} of {} refused pictures that were looked at (median), {fits}", each.len()),
         };
         Some(WhatFits { text, pictures: found.len() })
+    }
+
+    /// Says which two values are wrong, if two of altitude, focal length and limb height explain the limbs in the
+    /// pictures with these numbers and no single one does. They have to come from the whole run, because pictures that
+    /// follow each other are alike.
+    pub(crate) fn two_values(request: &Request, config: &Config, indices: &[u64]) -> Option<WhatFits> {
+        if indices.len() < FEWEST_FOR_TWO {
+            return None;
+        }
+        let body = config.each_body().first()?;
+        let found = Self::read(request, config, indices)?.any_fits(request, config)?;
+        let pair = diagnosis::find_pair(found.iter(), [body.limb_height_km, body.limb_height_sigma_km])?;
+        let words = diagnosis::two_values(&pair, config.camera.fx_px);
+        let pictures = found.iter().filter(|fit| diagnosis::is_misfit(fit, config)).count();
+        Some(WhatFits { text: format!("two values are wrong: {words}"), pictures })
+    }
+
+    /// Looks for a limb of any size in each picture.
+    fn any_fits(&self, request: &Request, config: &Config) -> Option<Vec<FitFacts>> {
+        let mut trial = AnyCone::new(config, request.flight).ok()?;
+        let mut find = |look: &Look| {
+            let view = look.picture.view(config.input.channel).ok()?;
+            diagnosis::find_any_fit(&mut trial, config, &view, look.data.as_ref())
+        };
+        Some(self.each.iter().filter_map(&mut find).collect())
     }
 
     /// Says which bars the pictures have that no mask covers.

@@ -300,7 +300,8 @@ impl Watch {
         let request = request_again(args)?;
         let refused = ReadAgain::read(&request, &plan.config, commonest.pictures)?;
         let fits = commonest.is_size.then(|| refused.what_fits(&request, &plan.config)).flatten();
-        Some(Again { bars: refused.bars(&plan.config), fits })
+        let two = ReadAgain::two_values(&request, &plan.config, &self.refusals.of_size());
+        Some(Again { bars: refused.bars(&plan.config), fits: two.or(fits) })
     }
 
     /// Returns the counts of the statuses, in words.

@@ -1,5 +1,9 @@
 //! Flights whose answers are each plausible, and together contradict what was told.
 
+use std::fmt::Write as _;
+
+use hzn_sim::flight::rocket;
+
 use crate::common::{Place, cell};
 use crate::start::{Flight, Lens};
 
@@ -84,4 +88,38 @@ fn the_limb_at_several_places_contradicts_a_wrong_principal_point() {
     let wrong = told("174.5", "cy_px = 119.5");
     let found = wrong.split_once("the principal point at cx_px = ").expect(&wrong).1.split_once(' ').expect(&wrong).0;
     assert!((found.parse::<f64>().unwrap() - 159.5).abs() < 8.0, "{wrong}");
+}
+
+/// No single value explains limbs that are seen with a wrong altitude and a wrong focal length.
+#[test]
+fn refused_pictures_name_two_values_that_are_wrong_at_once() {
+    let place = Place::new();
+    let flight = rocket(960, 540, 20, 9811);
+    std::fs::create_dir(place.path("flight")).unwrap();
+    flight.frames.iter().for_each(|f| f.render().unwrap().save(&place.path("flight").join(&f.file)).unwrap());
+    let run = |shift_km: f64, factor: f64| {
+        let mut sensor = flight.sensor.clone();
+        (sensor.camera.fx_px, sensor.camera.fy_px) = (sensor.camera.fx_px * factor, sensor.camera.fy_px * factor);
+        let mut table = "file,time_s,altitude_km\n".to_owned();
+        for frame in &flight.frames {
+            writeln!(table, "{},{},{}", frame.file, frame.time_s, frame.row().altitude_km + shift_km).unwrap();
+        }
+        place.write("flight/frames.csv", table.as_bytes());
+        place.write("flight/sensor.toml", hzn_files::sensor::to_text(&sensor).unwrap().as_bytes());
+        place.run(&["run", "flight", "-o", "r.csv", "--force"]).expect(0).err
+    };
+    let told = run(25.0, 0.94);
+    let words = told.split_once("two values are wrong: no single value explains the ").expect(&told).1;
+    let number = |before: &str| -> f64 {
+        let rest = words.split_once(before).expect(words).1;
+        rest.split_once(" ± ").expect(words).0.parse().unwrap()
+    };
+    let km = number("the altitude is ");
+    let focal_px = number("the focal length is ");
+    assert!((km - 25.0).abs() < 5.0 && words.contains(" km too high"), "{told}");
+    assert!((focal_px / flight.sensor.camera.fx_px - 1.0).abs() < 0.015, "{told}");
+    for (shift_km, factor) in [(0.0, 1.0), (25.0, 1.0), (0.0, 0.94)] {
+        let told = run(shift_km, factor);
+        assert!(!told.contains("two values are wrong"), "{shift_km} km, {factor}: {told}");
+    }
 }

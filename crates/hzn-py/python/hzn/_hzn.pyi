@@ -544,6 +544,8 @@ class Sensor:
         field of view with which it would be the expected one: ``the limb fits 59.8 +- 1.4 deg, expected 68.3 deg:
         altitude 1023 +- 107 km, or a field of view of 92.8 deg at 505 km``.
 
+        One picture cannot show that both are wrong at once; ``hzn run`` and the viewer compare several pictures.
+
         Parameters
         ----------
         image, altitude_km, position_km, bits

@@ -18,8 +18,12 @@ pub fn find_misfit<P: Pixels>(
     picture: &P,
     data: Option<&FrameData>,
 ) -> Option<FitFacts> {
-    let is_misfit = |fit: &FitFacts| fit.sigmas.abs() > config.gates.max_half_angle_sigma;
-    find_any_fit(trial, config, picture, data).filter(is_misfit)
+    find_any_fit(trial, config, picture, data).filter(|fit| is_misfit(fit, config))
+}
+
+/// Returns whether the half-angle of a fit differs from the expected one by more than `gates.max_half_angle_sigma`.
+pub fn is_misfit(fit: &FitFacts, config: &Config) -> bool {
+    fit.sigmas.abs() > config.gates.max_half_angle_sigma
 }
 
 /// Looks for a limb of any size, and returns what it says. `trial` is made from `config`.

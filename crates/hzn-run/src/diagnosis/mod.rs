@@ -24,7 +24,7 @@ pub use facts::{Consensus, FitFacts, Implied, Suspect, is_limb_as_expected, medi
 pub use field_of_view::{FieldOfView, find_field_of_view};
 pub use implied::{find_fit, fit_facts};
 pub use joint::{MOST_CORRELATION, Pair, Remedy, correlation, find_pair};
-pub use misfit::{find_any_fit, find_misfit};
+pub use misfit::{find_any_fit, find_misfit, is_misfit};
 pub use rates::{Gains, RateFault, RateTrial, find_rate_fault};
 pub use together::{Contradiction, Fault, Said, contradictions};
 pub use words::{contradiction, inseparable, two_values, what_fits};

@@ -158,6 +158,11 @@ fn a_file_outside_the_folder_is_written_only_if_the_user_agrees() {
     let (_last_dir, last) = bare_folder();
     open_and_wait(&mut window, &last);
     scale_to(&mut window, 1.9);
+    open(&mut window, &pictures);
+    click(&mut window, "Save changes");
+    assert!(asks(&window), "saving before leaving asks, too");
+    click(&mut window, "Cancel");
+    assert_eq!(window.state().sequence().inputs, [last.clone()]);
     save(&mut window);
     assert!(asks(&window));
     click(&mut window, "Save into the folder…");
