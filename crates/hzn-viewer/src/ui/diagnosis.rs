@@ -56,16 +56,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let card = frame.inner_margin(egui::Margin::symmetric(8, 6)).show(ui, |ui| {
         ui.set_width(ui.available_width());
         ui.strong("Diagnosis");
-        if let Some(cause) = answer.cause.and_then(|c| c.reason) {
-            ui.label(format!("{}: {}", answer.row.status, cause.name()));
-        }
-        // The sensor has not looked at the picture, so the reason is all there is to say.
-        if let Err(why) = &answer.report {
-            links::tip(viewer, ui, &format!("• {why}"));
-            if answer.row.status == Status::NoAltitude {
-                wrapped(ui, NOT_PROCESSED);
-            }
-        }
+        say_cause(viewer, ui, &answer);
         steps::show(viewer, ui, &steps);
         if let Some(otsu) = otsu {
             threshold_cause(viewer, ui, &answer, otsu);
@@ -92,6 +83,20 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
         viewer.focus_diagnosis = !ui.input(|i| i.pointer.any_pressed());
     }
     ui.add_space(4.0);
+}
+
+/// Says in a word why there is no answer.
+fn say_cause(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult) {
+    if let Some(cause) = answer.cause.and_then(|c| c.reason) {
+        ui.label(format!("{}: {}", answer.row.status, cause.name()));
+    }
+    // The sensor has not looked at the picture, so the reason is all there is to say.
+    if let Err(why) = &answer.report {
+        links::tip(viewer, ui, &format!("• {why}"));
+        if answer.row.status == Status::NoAltitude {
+            wrapped(ui, NOT_PROCESSED);
+        }
+    }
 }
 
 /// Returns what to do. The threshold comes first, because the limb is not seen without it, then the size of the limb,

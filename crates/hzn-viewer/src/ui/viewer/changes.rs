@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use super::outside::Outside;
 use crate::model::{Autosave, FileChange, Session, Unsaved};
 use crate::work::open::Request;
 
@@ -18,6 +17,17 @@ pub(in crate::ui) enum Leave {
     Sensor(Box<Session>),
     /// Make a new sensor.toml for the pictures.
     NewSensor,
+}
+
+/// A sensor.toml outside the folder that is open, which the user is asked about.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(in crate::ui) struct Outside {
+    /// The file that would be written.
+    pub(in crate::ui) path: PathBuf,
+    /// The folder of the pictures.
+    pub(in crate::ui) folder: PathBuf,
+    /// The file can be saved into this folder instead.
+    pub(in crate::ui) has_choice: bool,
 }
 
 /// The state of changes that are not saved.

@@ -51,10 +51,9 @@ use crate::work::open::{self, Request};
 use crate::work::sweep::Sweep;
 use crate::work::{Engine, FrameView, Job, Wake};
 use changes::Changes;
-pub(super) use changes::Leave;
+pub(super) use changes::{Leave, Outside};
 use companions::Companions;
 pub(super) use outputs::replaced;
-pub(super) use outside::Outside;
 use request_key::RequestKey;
 use sequence_work::SequenceWork;
 

@@ -3,19 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::Viewer;
+use super::changes::Outside;
 use crate::model::autosave;
 use crate::ui::path_dialog::{PathDialog, Purpose};
-
-/// A sensor.toml outside the folder that is open, which the user is asked about.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::ui) struct Outside {
-    /// The file that would be written.
-    pub(in crate::ui) path: PathBuf,
-    /// The folder of the pictures.
-    pub(in crate::ui) folder: PathBuf,
-    /// The file can be saved into this folder instead.
-    pub(in crate::ui) has_choice: bool,
-}
 
 impl Viewer {
     /// Returns the question about a file that lies outside the folder of the pictures. `None` if the file lies in it,
