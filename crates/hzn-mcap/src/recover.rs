@@ -131,7 +131,7 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
     let copied = open_container(&copy_path).map_err(failed).and_then(|mut out| {
         let found = copy_frames(&part, &mut out, &part, &mut |_, _| true)?;
         out.flush().map_err(failed)?;
-        publish(out.output().get_ref(), &copy_path, &part).map_err(failed)?;
+        publish_copy(&lock, out.output().get_ref(), &copy_path, &part).map_err(failed)?;
         Ok((found, out))
     });
     if copied.is_err() {
@@ -139,6 +139,15 @@ pub fn resume(path: impl AsRef<Path>, options: &Options) -> Result<Resumed, Erro
     }
     let (found, out) = copied?;
     Ok(Resumed { frames: found.frames, last_index, writer: Writer::with_container(out, path, &part, options) })
+}
+
+/// Puts the copy of a file in its place. Its frames are as old as before, so it keeps the time of the last write.
+fn publish_copy(old: &File, copy: &File, copy_path: &Path, path: &Path) -> io::Result<()> {
+    if let Ok(written) = old.metadata().and_then(|data| data.modified()) {
+        // A file system may be unable to change it.
+        let _ = copy.set_modified(written);
+    }
+    publish(copy, copy_path, path)
 }
 
 /// Returns whether a recording has the sensor of `options`, or the rig and its sensors. `None` if it lacks one of the

@@ -170,6 +170,7 @@ fn finished(name: String, data: FrameData, outcomes: Vec<BodyOutcome>) -> Finish
         tip: None,
         pages: 1,
         mask: None,
+        identity: None,
         bytes: None,
         brightness_by_sun: None,
     }

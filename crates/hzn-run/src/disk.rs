@@ -9,6 +9,13 @@ use hzn_mcap::part_path;
 
 use crate::error::{Error, Remedy, failed, unusable};
 
+/// Returns the name of the file next to an unfinished output that says which pictures were processed.
+pub fn chain_path(path: &Path) -> PathBuf {
+    let mut name = part_path(path).into_os_string();
+    name.push(".chain");
+    name.into()
+}
+
 /// Returns whether two paths lead to the same existing file or folder.
 pub fn is_same(a: &Path, b: &Path) -> bool {
     let b = if b.as_os_str().is_empty() { Path::new(".") } else { b };
@@ -16,12 +23,12 @@ pub fn is_same(a: &Path, b: &Path) -> bool {
 }
 
 /// Refuses to write a file that is also read, under whatever name: by another path, or through a link. Each file that
-/// is written counts with its `.part`.
+/// is written counts with its `.part` and the file next to that.
 ///
 /// # Errors
 /// One of the files is read as well. The user may not replace it, so the error has no remedy.
 pub fn refuse_inputs(read: &[PathBuf], written: &[PathBuf]) -> Result<(), Error> {
-    let with_part = written.iter().flat_map(|path| [path.clone(), part_path(path)]);
+    let with_part = written.iter().flat_map(|path| [path.clone(), part_path(path), chain_path(path)]);
     refuse_inputs_exactly(read, &with_part.collect::<Vec<_>>())
 }
 

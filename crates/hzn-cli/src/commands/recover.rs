@@ -54,10 +54,15 @@ pub(super) fn run(args: &Args) -> Outcome {
         let what = "exists already; choose another name with -o, or --force replaces it";
         return Err(usage(format!("{}: {what}", path.display())));
     }
+    let written = std::fs::metadata(file).and_then(|data| data.modified());
     let (rows, lost) = match target {
         sink::Target::Mcap => recording(file, &path)?,
         target => table(file, &path, target)?,
     };
+    // A run that continues the file compares the pictures with the time at which the results were written.
+    if let Ok(written) = written {
+        sink::set_written(&path, written)?;
+    }
     let dropped = if lost > 0 { format!(", {lost} bytes without whole pictures dropped") } else { String::new() };
     tell::line(format_args!("{}: {} kept{dropped}", path.display(), explain::counted(rows, "row")));
     if unfinished && args.output.is_none() && file.exists() {

@@ -6,15 +6,15 @@ use hzn_mcap::Row;
 use hzn_run::checked_row;
 use hzn_run::engine::{self, AnySensor, Plan, REMEMBERED, Sums, Turns};
 use hzn_run::sink::{self, StoredResults};
-use hzn_run::source::{Item, Payload, Source};
+use hzn_run::source::{Item, Source};
 
 use crate::exit::{Stop, usage};
 use crate::tell;
 
 /// Skips the pictures that the output contains already, and checks that this run would give the same results. The last
-/// of them is processed again, and so is each picture file that was changed since the results were written; each must
-/// give the row in the output. If the table of the pictures was changed, this holds for all pictures. Returns the
-/// answers and turns up to the last of them.
+/// of them is processed again, and so is each picture that was changed since; each must give the row in the output. If
+/// the table of the pictures was changed, this holds for all pictures, and if a row was changed, for those from there
+/// on. Returns the answers and turns up to the last of them.
 pub(super) fn skip_stored(
     source: &mut dyn Source,
     stored: &StoredResults,
@@ -26,6 +26,8 @@ pub(super) fn skip_stored(
     let table = plan.frames.as_ref().map(|frames| &frames.path);
     let changed_table = table.filter(|table| stored.frames > 0 && stored.is_older_than(table));
     changed_table.iter().for_each(|table| tell_changed(table));
+    let contradicted_from = stored.contradicted_from();
+    contradicted_from.iter().for_each(|from| tell_contradicted(&name, *from));
     let mut again = Again { sensor: None, plan: Plan { overlay: None, masks: None, ..plan.clone() }, stored };
     let mut turns = Turns::default();
     for n in 0..stored.frames {
@@ -41,10 +43,11 @@ pub(super) fn skip_stored(
             let what = format!("its last picture is {}, but the input has {} in this place", row.file, item.name);
             return other(format!("{what}; give the input that it was begun with"));
         }
-        let changed = file_of(&item).is_some_and(|file| stored.is_older_than(file));
+        let changed = stored.is_changed(n, std::iter::once(&item.payload));
+        let contradicted = contradicted_from.is_some_and(|from| n >= from);
         let before = turns.clone();
         again.replay(n, &item, &mut turns);
-        if !(is_last || changed || changed_table.is_some()) {
+        if !(is_last || changed || contradicted || changed_table.is_some()) {
             // The pictures after these are compared with their bytes.
             if n + REMEMBERED as u64 >= stored.frames {
                 turns.see_sums(sums(item, plan));
@@ -54,32 +57,58 @@ pub(super) fn skip_stored(
         let picture = item.name.clone();
         let (same, sums) = again.gives_the_same(n, item, before)?;
         turns.see_sums(sums);
-        match same {
-            Some(true) => {}
-            // Without the pictures before it, a picture would give another result.
-            None if !changed && changed_table.is_none() => {}
-            None => {
-                let what = "was changed since these results were written, and its result depends on the pictures \
-                            before it, so that it cannot be compared alone";
-                let file = if changed { picture } else { table.map(|p| p.display().to_string()).unwrap_or_default() };
-                return other(format!("{file} {what}"));
-            }
-            Some(false) if changed => {
-                let what = format!("the picture {picture} was changed since these results were written, and now gives");
-                return other(format!("{what} another result; give the pictures that it was begun with"));
-            }
-            Some(false) => return other(another_result(&picture, is_last)),
+        let looked = Looked { picture: &picture, is_last, changed, contradicted, changed_table };
+        if let Some(what) = looked.refusal(same) {
+            return other(what);
         }
     }
     Ok(turns)
 }
 
-fn another_result(picture: &str, is_last: bool) -> String {
-    let which = if is_last { "its last picture, " } else { "its picture " };
-    format!(
-        "{which}{picture}, now gives another result; give the sensor.toml, frames.csv and options (--altitude-km, \
-         --fps, --flight) that it was begun with"
-    )
+/// A picture that was looked at again, with the reasons for it.
+struct Looked<'a> {
+    picture: &'a str,
+    is_last: bool,
+    /// Whether the picture was changed.
+    changed: bool,
+    /// Whether its rows are not those that were written.
+    contradicted: bool,
+    /// The table of the pictures, if it was changed.
+    changed_table: Option<&'a PathBuf>,
+}
+
+impl Looked<'_> {
+    /// Returns why the run cannot go on, if so. `same` says whether the picture gives its rows again; `None` if this
+    /// also depends on the pictures before it.
+    fn refusal(&self, same: Option<bool>) -> Option<String> {
+        let picture = self.picture;
+        let depends = "and its result depends on the pictures before it, so that it cannot be compared alone";
+        match (same, self.changed_table) {
+            (Some(true), _) => None,
+            (Some(false), _) if self.changed => Some(format!(
+                "the picture {picture} was changed since these results were written, and now gives another result; \
+                 give the pictures that it was begun with"
+            )),
+            (Some(false), _) => {
+                let which = if self.is_last { "its last picture, " } else { "its picture " };
+                Some(format!(
+                    "{which}{picture}, now gives another result; give the sensor.toml, frames.csv and options \
+                     (--altitude-km, --fps, --flight) that it was begun with"
+                ))
+            }
+            (None, _) if self.changed => {
+                Some(format!("{picture} was changed since these results were written, {depends}"))
+            }
+            (None, _) if self.contradicted => {
+                Some(format!("its row of the picture {picture} is not the one that was written, {depends}"))
+            }
+            (None, Some(table)) => {
+                Some(format!("{} was changed since these results were written, {depends}", table.display()))
+            }
+            // Without the pictures before it, a picture would give another result.
+            (None, None) => None,
+        }
+    }
 }
 
 fn tell_changed(table: &Path) {
@@ -87,17 +116,14 @@ fn tell_changed(table: &Path) {
     tell::line(format_args!("note: {} {what}", table.display()));
 }
 
+fn tell_contradicted(outputs: &str, from: u64) {
+    let what = "the rows are not those that were written, so that they are compared with their pictures";
+    tell::line(format_args!("note: {outputs}: from picture {from} on, {what}"));
+}
+
 /// Returns the checksums of a picture as the sensor sees it; `None` if it cannot be read.
 fn sums(item: Item, plan: &Plan) -> Option<Sums> {
     item.decode(&plan.config).as_ref().map(Sums::of)
-}
-
-/// Returns the file of a picture that has a file of its own.
-fn file_of(item: &Item) -> Option<&PathBuf> {
-    match &item.payload {
-        Payload::File(path) | Payload::RawFile(path, _) => Some(path),
-        Payload::Encoded(_) | Payload::Decoded(_) | Payload::Broken(_) => None,
-    }
 }
 
 /// Processes pictures again and compares them with what is stored.

@@ -76,7 +76,9 @@ pub(super) fn run(mut args: Args) -> Outcome {
     let end = engine::run(&plan, source.as_mut(), stored.frames, &stop, &mut output, &mut see);
     let summary = watch.summary(&plan.config);
     let end = end?;
-    output.finish()?;
+    let done = stored.frames + watch.progress.frames();
+    let is_interrupted = end == End::Interrupted && args.has_more(done, total);
+    output.finish(!is_interrupted)?;
     let lost = source.describe_loss().filter(|_| end == End::Complete);
     lost.iter().for_each(tell::warning);
     watch.tell(&plan);
@@ -85,9 +87,7 @@ pub(super) fn run(mut args: Args) -> Outcome {
         watch.sum_up(args, &plan, source.as_ref(), &again, (&summary, stored.frames));
     }
     watch.tell_doubts(args, &plan, again.fits.as_ref(), end);
-    let done = stored.frames + watch.progress.frames();
-    // Ctrl-C is the only end of a run that waits for pictures.
-    if end == End::Interrupted && watching.is_none() && total.is_none_or(|n| done < n) {
+    if is_interrupted {
         tell_interruption(done, total, &args.output);
         return Ok(Exit::Interrupted);
     }

@@ -120,16 +120,9 @@ fn overlays_of_different_folders_do_not_collide() {
 #[cfg(unix)]
 mod unix {
     use super::*;
+    use crate::common::limited;
     use std::os::unix::fs::{PermissionsExt, symlink};
     use std::process::Command;
-
-    /// Runs the command under limits of bash, such as `ulimit -v`.
-    fn limited(place: &Place, limits: &str, args: &[&str]) -> Ran {
-        let hzn = place.command(&[]);
-        let mut shell = Command::new("bash");
-        shell.args(["-c", &format!("{limits}; exec \"$0\" \"$@\"")]).arg(hzn.get_program()).args(args);
-        Ran::from_output(&shell.current_dir(place.path("")).output().unwrap(), &place.path(""))
-    }
 
     #[test]
     fn devices_and_pipes_are_unreadable_pictures() {

@@ -27,6 +27,7 @@ const CASES: &[Case] = &[
     ("f.csv", &["run", "in", "--frames", "f.csv", "-o", "f-hard.csv", "--force"]),
     ("new.csv.part", &["run", "in", "--frames", "new.csv.part", "-o", "new.csv", "--force"]),
     ("new.csv.part", &["run", "in", "--frames", "new.csv.part", "-o", "new.csv", "--resume"]),
+    ("new.csv.part.chain", &["run", "in", "--frames", "new.csv.part.chain", "-o", "new.csv", "--force"]),
     ("s.csv", &["run", "in", "--sensor", "s.csv", "-o", "s.csv", "--force"]),
     ("lens.csv", &["run", "in", "--sensor", "lens.toml", "-o", "lens.csv", "--force"]),
     ("a.mcap", &["run", "a.mcap", "-o", "a.mcap", "--force"]),
@@ -178,7 +179,7 @@ fn place() -> Place {
     let copy = |from: &str, to: &str| assert!(fs::copy(place.path(from), place.path(to)).unwrap() > 0);
     copy("in/0001.png", "other/0001.png");
     copy("a.mcap", "b.recovering.mcap");
-    for name in ["in/frames.csv", "f.csv", "g.csv", "n.innovations.csv", "new.csv.part"] {
+    for name in ["in/frames.csv", "f.csv", "g.csv", "n.innovations.csv", "new.csv.part", "new.csv.part.chain"] {
         place.write(name, b"file,altitude_km\n0000.png,400\n0001.png,400\n");
     }
     for name in ["s.csv", "state/parameters-1.bin"] {

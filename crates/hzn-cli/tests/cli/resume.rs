@@ -1,5 +1,7 @@
 //! Tests of runs that end early, on a full disk or by a signal, and of their continuation.
 
+#[cfg(target_os = "linux")]
+use crate::common::limited;
 use crate::common::{Place, without_time};
 use std::time::{Duration, Instant};
 
@@ -27,11 +29,7 @@ fn a_disk_that_fills_up_keeps_what_is_finished() {
     place.run(&["run", "in", "-o", "whole.csv", "-q"]).expect(0);
     let whole = without_time(&place.read("whole.csv"));
     for (out, blocks) in [("a.csv", 60), ("a.jsonl", 120), ("a.mcap", 800)] {
-        let limited = format!("ulimit -f {blocks}; exec \"$0\" run in -o {out}");
-        let hzn = place.command(&[]);
-        let mut shell = std::process::Command::new("bash");
-        shell.args(["-c", &limited]).arg(hzn.get_program()).current_dir(place.path(""));
-        crate::common::Ran::from_output(&shell.output().unwrap(), &place.path(""))
+        limited(&place, &format!("ulimit -f {blocks}"), &["run", "in", "-o", out])
             .expect(1)
             .says("ulimit -f")
             .says("resume the run to");
@@ -112,7 +110,10 @@ fn interrupted_leaves_a_valid_file() {
         assert_eq!(end_early(&place, out, "-INT"), Some(130), "{out}");
         assert!(place.path(out).exists());
         place.run(&["info", out]).expect(0);
+        let chain = place.path(&format!("{out}.part.chain"));
+        assert!(chain.exists(), "the run may be continued");
         place.run(&["run", "in", "-o", out, "--resume"]).expect(0);
+        assert!(!chain.exists(), "the run is over");
         place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0).says("2000 rows");
     }
 }
@@ -165,8 +166,17 @@ fn changed_pictures_are_not_mixed_with_their_old_results() {
         let before = std::fs::read(place.path(out)).unwrap();
         let resume = || place.run(&["run", "in", "-o", out, "--resume"]);
         let refuse = |what: &str| {
-            resume().expect(2).says(what).says("--force");
-            assert!(std::fs::read(place.path(out)).unwrap() == before, "{out}");
+            // The second time, the results must not look newer than what was changed after them.
+            for _ in 0..2 {
+                resume().expect(2).says(what).says("--force");
+                assert!(std::fs::read(place.path(out)).unwrap() == before, "{out}");
+            }
+            let part = format!("{out}.part");
+            std::fs::rename(place.path(out), place.path(&part)).unwrap();
+            resume().expect(2).says(what);
+            place.run(&["recover", &part]).expect(0);
+            resume().expect(2).says(what);
+            std::fs::write(place.path(out), &before).unwrap();
         };
         let old = std::fs::read(place.path("in/0001.png")).unwrap();
         let time = std::fs::metadata(place.path("in/0001.png")).unwrap().modified().unwrap();
@@ -183,6 +193,83 @@ fn changed_pictures_are_not_mixed_with_their_old_results() {
         let ran = resume().expect(0);
         assert!(ran.err.contains("frames.csv was changed since these results were written"), "{}", ran.err);
         table([400; 5]);
+    }
+}
+
+/// Writes a file in the place of another one. A link to the old file keeps it. Its time of writing is an hour ago.
+#[cfg(target_os = "linux")]
+fn replace(place: &Place, name: &str, bytes: &[u8]) {
+    std::fs::remove_file(place.path(name)).unwrap();
+    place.write(name, bytes);
+    shift_time(place, name, -1);
+}
+
+/// Lets a file look as if it was written so many hours from now.
+#[cfg(target_os = "linux")]
+fn shift_time(place: &Place, name: &str, hours: i64) {
+    let shift = Duration::from_secs(3600 * hours.unsigned_abs());
+    let now = std::time::SystemTime::now();
+    let time = if hours < 0 { now - shift } else { now + shift };
+    std::fs::File::options().write(true).open(place.path(name)).unwrap().set_modified(time).unwrap();
+}
+
+/// The results look newer than all pictures, as those do that were copied, or whose run still wrote when a picture was
+/// replaced. Only the file next to them tells what was changed.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_continued_run_knows_which_pictures_and_rows_there_were() {
+    let place = Place::with_pictures(600);
+    place.run(&["run", "in", "-o", "whole.csv", "-q"]).expect(0);
+    let whole = without_time(&place.read("whole.csv"));
+    place.run(&["run", "in/0000.png", "in/0001.png", "-o", "other.csv", "--altitude-km", "410"]).expect(0);
+    place.run(&["run", "in/0000.png", "in/0001.png", "-o", "other.jsonl", "--altitude-km", "410"]).expect(0);
+    place.run(&["run", "in", "-o", "flight.mcap", "-q"]).expect(0);
+    let first = std::fs::read(place.path("in/0001.png")).unwrap();
+    let third = std::fs::read(place.path("in/0003.png")).unwrap();
+    for (input, out, blocks) in
+        [("in", "a.csv", 60), ("in", "a.jsonl", 120), ("in", "a.mcap", 800), ("flight.mcap", "b.csv", 60)]
+    {
+        limited(&place, &format!("ulimit -f {blocks}"), &["run", input, "-o", out]).expect(1);
+        let part = format!("{out}.part");
+        let chain = place.path(&format!("{part}.chain"));
+        let (rows, known) = (std::fs::read(place.path(&part)).unwrap(), std::fs::read(&chain).unwrap());
+        assert!(known.len() > 16 * 20, "{out}: {} bytes", known.len());
+        let refuse = |what: &str| {
+            shift_time(&place, &part, 1);
+            let before = std::fs::read(place.path(&part)).unwrap();
+            place.run(&["run", input, "-o", out, "--resume"]).expect(2).says(what).says("--force");
+            // A recording that is continued is a copy.
+            assert!(out == "a.mcap" || std::fs::read(place.path(&part)).unwrap() == before, "{out}");
+            assert!(std::fs::read(&chain).unwrap() == known, "{out}");
+        };
+        let with_picture = |bytes: &[u8]| {
+            replace(&place, "in/0001.png", bytes);
+            if input != "in" {
+                place.run(&["run", "in", "-o", input, "-q", "--force"]).expect(0);
+            }
+        };
+        with_picture(&third);
+        refuse("the picture 0001.png was changed since these results were written");
+        with_picture(&first);
+        if let Some(kind) = out.strip_prefix("a.").filter(|kind| *kind != "mcap") {
+            // A row of another run, with a right checksum and in the right place.
+            let head = usize::from(kind == "csv");
+            let (own, other) = (String::from_utf8(rows.clone()).unwrap(), place.read(&format!("other.{kind}")));
+            let line = |text: &str, n: usize| text.split_inclusive('\n').nth(head + n).unwrap().to_owned();
+            place.write(&part, own.replace(&line(&own, 1), &line(&other, 1)).as_bytes());
+            let note = format!("{out}: from picture 1 on, the rows are not those that were written");
+            refuse(&note);
+            refuse("its picture 0001.png, now gives another result");
+            place.write(&part, &rows);
+        }
+        // A file of another run is no obstacle: the pictures are compared.
+        place.write(&format!("{part}.chain"), &[&known[..16], &known[48..]].concat());
+        shift_time(&place, &part, 1);
+        let ran = place.run(&["run", input, "-o", out, "--resume"]).expect(0).says("that were finished before");
+        ran.says("from picture 0 on, the rows are not those");
+        assert!(!chain.exists());
+        place.run(&["export", out, "-o", "rows.csv", "--force"]).expect(0);
+        assert_eq!(without_time(&place.read("rows.csv")), whole, "{out}");
     }
 }
 

@@ -128,8 +128,8 @@ fn a_rig_continues_no_other_run() {
         place.write("ring/rig.toml", rig.replace("sync_s", "limb_tilt_sigma_km = 30.0\nsync_s").as_bytes());
         match out {
             "a.mcap" => refuse("was begun with another sensor.toml"),
-            // The last epochs have no limb, so nothing in their rows depends on it.
-            _ => drop(resume(&place, out, &["-q"]).expect(0)),
+            // The pictures that were put back are newer than the results, so their epochs are compared.
+            _ => refuse("its epoch 0, front-00000.png, now gives another result"),
         }
         place.write("ring/rig.toml", rig.as_bytes());
     }
@@ -160,4 +160,30 @@ fn a_tracking_rig_gives_the_same_on_any_number_of_threads_and_continued() {
     place.write("cut.csv.part", text.split_inclusive('\n').take(9).collect::<String>().as_bytes());
     resume(&place, "cut.csv", &["-q"]).expect(0);
     assert_eq!(rows(&place, "cut.csv"), whole);
+}
+
+/// The results look newer than the pictures, and the file next to them tells what was changed.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_rig_knows_which_pictures_there_were() {
+    let place = ring();
+    place.run(&["run", "ring/rig.toml", "-o", "whole.csv", "-q"]).expect(0);
+    let whole = rows(&place, "whole.csv");
+    let limit = fs::metadata(place.path("whole.csv")).unwrap().len() * 3 / 4 / 1024;
+    let args = ["run", "ring/rig.toml", "-o", "a.csv", "-q"];
+    crate::common::limited(&place, &format!("ulimit -f {limit}"), &args).expect(1);
+    let file = |n: usize| place.path(&format!("ring/front/front-{n:05}.png"));
+    let late = || {
+        let part = fs::File::options().write(true).open(place.path("a.csv.part")).unwrap();
+        part.set_modified(std::time::SystemTime::now() + std::time::Duration::from_secs(3600)).unwrap();
+    };
+    let old = fs::read(file(1)).unwrap();
+    fs::copy(file(6), file(1)).unwrap();
+    late();
+    resume(&place, "a.csv", &[]).expect(2).says("its epoch 1, front-00001.png, now gives another result");
+    fs::write(file(1), old).unwrap();
+    late();
+    resume(&place, "a.csv", &["-q"]).expect(0);
+    assert_eq!(rows(&place, "a.csv"), whole);
+    assert!(!place.path("a.csv.part.chain").exists());
 }

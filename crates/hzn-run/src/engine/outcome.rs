@@ -46,6 +46,8 @@ pub struct Finished {
     pub pages: u32,
     /// What became of the mask, if the plan asks for masks.
     pub mask: Option<MaskOutcome>,
+    /// What tells the picture from another one in its place: of its file before it was read, or of its bytes.
+    pub identity: Option<u64>,
     /// The bytes of the picture, if it could be read and is compared with those before.
     pub bytes: Option<Bytes>,
     /// Correlation of the brightness of the first body with the height of the told Sun over its surface, from -1 to 1,

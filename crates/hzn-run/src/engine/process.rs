@@ -22,7 +22,9 @@ use crate::{overlay, overlay::caption::Caption, record};
 /// # Errors
 /// An overlay or a mask cannot be written.
 pub fn process_one(plan: &Plan, sensor: &mut AnySensor, index: u64, item: Item) -> Result<Finished, Error> {
-    let mut finished = process_and_draw(plan, sensor, index, item)?;
+    // A file that is replaced while it is read then counts as changed.
+    let identity = item.payload.identity();
+    let mut finished = Finished { identity, ..process_and_draw(plan, sensor, index, item)? };
     if let Some(masks) = &plan.masks {
         let data = finished.data.as_ref();
         finished.mask = Some(masks.write(&finished.name, &finished.answers(), data, &sensor.camera_of(data))?);
@@ -52,6 +54,7 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
         tip: None,
         pages: decoded.as_ref().map_or(1, |(p, _)| p.pages),
         mask: None,
+        identity: None,
         bytes: decoded.as_ref().ok().map(|(picture, _)| Bytes::of(picture, time)),
         brightness_by_sun: None,
     };

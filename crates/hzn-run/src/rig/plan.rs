@@ -12,7 +12,7 @@ use super::seen::{Repeat, Seen};
 use super::start::Start;
 use crate::engine::{self, AnySensor, End, Finished, InOrder, Sink, Turns, Work, run_in_order};
 use crate::error::Error;
-use crate::sink::{self, Outputs};
+use crate::sink::{self, Outputs, all_identities};
 
 /// The settings of a run over a rig.
 pub struct Plan {
@@ -60,7 +60,8 @@ pub fn run(
     let mut order = Order::new(plan, start);
     let write = |(index, mut heads): (u64, Vec<Option<Finished>>), output: &mut &mut Outputs| {
         let (joint, repeats) = order.join(index, &mut heads);
-        output.write_heads(&records(plan, &joint, &mut heads))?;
+        let identity = all_identities(heads.iter().flatten().map(|frame| frame.identity));
+        output.write_heads(&records(plan, &joint, &mut heads), identity)?;
         seen(&FinishedEpoch { joint, heads, repeats });
         Ok(())
     };

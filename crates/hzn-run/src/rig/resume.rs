@@ -4,7 +4,7 @@
 //! second run of the last epochs, which are compared with what the outputs contain. The brightness at the last limb of
 //! a head comes from that one picture.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::epochs::{Epoch, Epochs};
 use super::levels::Levels;
@@ -14,11 +14,11 @@ use crate::engine::{Turns, Work, process_one};
 use crate::error::{Error, Remedy, unusable};
 use crate::explain::counted;
 use crate::sink::{StoredEpoch, StoredPicture, StoredResults};
-use crate::source::Payload;
 
 /// Returns the number of the epoch from which on a continued run processes the pictures again: the one before the last
-/// that the outputs contain, or before the first with a picture that was changed since. `tables` are the files with the
-/// data of the pictures; if one was changed, it is the first epoch, and so it is if a sensor uses earlier pictures.
+/// that the outputs contain, or before the first with a picture or a row that was changed since. `tables` are the files
+/// with the data of the pictures; if one was changed, it is the first epoch, and so it is if a sensor uses earlier
+/// pictures.
 ///
 /// # Errors
 /// The input has other pictures than the results, or a source breaks off.
@@ -38,12 +38,12 @@ pub fn run_again_from(
         };
         let epoch = epoch?;
         check_names(plan, index, &epoch, stored_epoch)?;
-        let is_changed = |path: &Path| stored.is_older_than(path);
-        if epoch.pictures.iter().flatten().any(|(_, item)| file_of(&item.payload).is_some_and(is_changed)) {
+        if stored.is_changed(index, epoch.pictures.iter().flatten().map(|(_, item)| &item.payload)) {
             from = from.min(index.saturating_sub(1));
         }
     }
-    Ok(from)
+    // The joint answer of an epoch is compared only together with the epoch before.
+    Ok(stored.contradicted_from().map_or(from, |first| from.min(first.saturating_sub(1))))
 }
 
 /// Goes on to an epoch in the input, with what the results say of the epochs before. `None` if they do not say all that
@@ -98,12 +98,4 @@ fn check_names(plan: &Plan, index: u64, epoch: &Epoch, stored: &StoredEpoch) -> 
 fn other_input(what: String) -> Error {
     unusable(format!("{what}; give the rig.toml and the pictures that they were begun with"))
         .with_remedy(Remedy::Restart)
-}
-
-/// Returns the file of a picture that has a file of its own.
-fn file_of(payload: &Payload) -> Option<&Path> {
-    match payload {
-        Payload::File(path) | Payload::RawFile(path, _) => Some(path),
-        Payload::Encoded(_) | Payload::Decoded(_) | Payload::Broken(_) => None,
-    }
 }

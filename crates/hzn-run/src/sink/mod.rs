@@ -3,18 +3,20 @@
 //! A file is written as `NAME.part` and gets its final name at the end, also after Ctrl-C. Therefore every file with
 //! the final name is complete. A crash leaves the `.part` file. [`open`] can continue either.
 
+mod chain;
 mod outputs;
 mod stored;
 mod text;
 
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use hzn_core::Config;
 use hzn_mcap::{Contents, FrameRecord, Options, Reader, part_path};
 
 pub use outputs::Outputs;
-pub(crate) use stored::StoredPicture;
 pub use stored::{StoredEpoch, StoredResults};
+pub(crate) use stored::{StoredPicture, all_identities};
 
 pub use crate::record::{altitude_km, records, rows};
 
@@ -254,6 +256,14 @@ fn read_stored(part: &Path, is_rig: bool) -> StoredResults {
     stored
 }
 
+/// Sets the time of the last write of a file.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn set_written(file: &Path, written: SystemTime) -> std::io::Result<()> {
+    std::fs::File::options().write(true).open(file)?.set_modified(written)
+}
+
 impl Output {
     /// Closes the file and gives it its final name.
     ///
@@ -269,15 +279,22 @@ impl Output {
     }
 
     /// Closes an output that was opened to be continued, without further results. It keeps the name that it had: an
-    /// unfinished file stays unfinished.
+    /// unfinished file stays unfinished. It also keeps the time of its last write, because the next attempt compares
+    /// the pictures with it.
     ///
     /// # Errors
     /// The disk fails.
-    pub fn put_back(mut self) -> Result<(), Error> {
+    fn put_back(mut self, written: Option<SystemTime>) -> Result<(), Error> {
+        let name = |path: &PathBuf| if self.was_final { path.clone() } else { part_path(path) };
+        let file = self.path.as_ref().map(name);
         if self.was_final {
-            return self.finish();
+            self.finish()?;
+        } else {
+            self.flush()?;
+            drop(self);
         }
-        self.flush()
+        let Some((file, written)) = file.zip(written) else { return Ok(()) };
+        set_written(&file, written).map_err(|e| cannot_write(&file, &e))
     }
 
     /// Removes the unfinished file. A file that already has the final name is not changed.

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use hzn_mcap::FrameRecord;
+use hzn_mcap::{FrameRecord, Row};
 
+use super::chain::{Chain, Links};
 use super::{Existing, Output, Settings, StoredResults, Target, on_stdout, open, rows, target};
 use crate::checked_row::sum;
 use crate::engine::{Finished, Sink};
@@ -28,6 +29,8 @@ struct One {
     name: String,
     /// The results that it contained before this run. Its pictures are compared, not written again.
     stored: StoredResults,
+    /// The file next to it that says which pictures were processed; not for stdout.
+    chain: Option<Chain>,
 }
 
 impl Outputs {
@@ -43,23 +46,27 @@ impl Outputs {
         settings: Settings<'_>,
     ) -> Result<(Self, StoredResults), Error> {
         Self::check(paths, existing)?;
-        let mut each = Vec::new();
+        let mut outputs = Self { each: Vec::new(), next: 0, again_from: 0, has_written: false };
         for path in order(paths) {
-            let (output, stored) = if path == Path::new(STDOUT) {
-                (on_stdout(format, settings.config)?, StoredResults::default())
-            } else {
-                open(path, existing, settings)?
-            };
-            each.push(One { output, name: path.display().to_string(), stored });
+            match One::open(path, format, existing, settings) {
+                Ok(one) => outputs.each.push(one),
+                Err(error) => {
+                    outputs.put_back()?;
+                    return Err(error);
+                }
+            }
         }
-        let shortest = each.iter().map(|one| &one.stored).min_by_key(|stored| stored.frames).cloned();
+        let shortest = outputs.each.iter().map(|one| &one.stored).min_by_key(|stored| stored.frames).cloned();
         let shortest = shortest.unwrap_or_default();
         let differs = |one: &&One| !one.stored.sums.starts_with(&shortest.sums);
-        if let Some(other) = each.iter().find(differs) {
+        if let Some(other) = outputs.each.iter().find(differs) {
             let what = "contains other results than the other outputs, so they are not of one run";
-            return Err(unusable(format!("{}: {what}", other.name)).with_remedy(Remedy::Restart));
+            let error = unusable(format!("{}: {what}", other.name)).with_remedy(Remedy::Restart);
+            outputs.put_back()?;
+            return Err(error);
         }
-        Ok((Self { each, next: shortest.frames, again_from: 0, has_written: false }, shortest))
+        outputs.next = shortest.frames;
+        Ok((outputs, shortest))
     }
 
     /// Refuses outputs that contradict each other, before anything is opened.
@@ -99,18 +106,21 @@ impl Outputs {
         self.has_written
     }
 
-    /// Appends the records of an epoch of a rig, as [`Output::write_heads`] does. An output that contains the epoch
-    /// already must have the same rows.
+    /// Appends the records of an epoch of a rig, as [`Output::write_heads`] does. `identity` tells its pictures from
+    /// others. An output that contains the epoch already must have the same rows.
     ///
     /// # Errors
     /// The disk fails, or an output contains another result.
-    pub fn write_heads(&mut self, heads: &[Vec<FrameRecord>]) -> Result<(), Error> {
+    pub(crate) fn write_heads(&mut self, heads: &[Vec<FrameRecord>], identity: Option<u64>) -> Result<(), Error> {
         // The joint answer also depends on the epoch before.
         let with_joint = self.next == 0 || self.next > self.again_from;
         for one in &mut self.each {
             if self.next < one.stored.frames {
                 one.compare_epoch(self.next, heads, with_joint)?;
             } else {
+                if let Some(chain) = &mut one.chain {
+                    chain.add(identity, &sums(heads.iter().flatten().map(|record| &record.row))?)?;
+                }
                 one.output.write_heads(heads)?;
                 self.has_written = true;
             }
@@ -119,32 +129,60 @@ impl Outputs {
         Ok(())
     }
 
-    /// Closes the files and gives them their final names.
+    /// Closes the files and gives them their final names. `is_over` says that the run has ended by itself; otherwise
+    /// what is known of the pictures stays next to them, for the run that continues this one.
     ///
     /// # Errors
     /// The disk fails. The other outputs are finished all the same.
-    pub fn finish(self) -> Result<(), Error> {
-        self.close(Output::finish)
+    pub fn finish(mut self, is_over: bool) -> Result<(), Error> {
+        if !is_over {
+            self.flush_chains()?;
+        }
+        self.close(|one| {
+            one.output.finish()?;
+            one.chain.into_iter().filter(|_| is_over).for_each(Chain::remove);
+            Ok(())
+        })
     }
 
-    /// Closes outputs that were opened to be continued, as [`Output::put_back`] does.
+    /// Closes outputs that were opened to be continued, without further results. Their names and the times of their
+    /// last writes stay.
     ///
     /// # Errors
     /// The disk fails.
     pub fn put_back(self) -> Result<(), Error> {
-        self.close(Output::put_back)
+        self.close(|one| one.output.put_back(one.stored.written))
     }
 
-    fn close(self, how: impl Fn(Output) -> Result<(), Error>) -> Result<(), Error> {
-        let closed: Vec<_> = self.each.into_iter().map(|one| how(one.output)).collect();
+    fn close(self, how: impl Fn(One) -> Result<(), Error>) -> Result<(), Error> {
+        let closed: Vec<_> = self.each.into_iter().map(how).collect();
         closed.into_iter().collect()
+    }
+
+    fn flush_chains(&mut self) -> Result<(), Error> {
+        self.each.iter_mut().filter_map(|one| one.chain.as_mut()).try_for_each(Chain::flush)
+    }
+}
+
+impl One {
+    fn open(path: &Path, format: Target, existing: Existing, settings: Settings<'_>) -> Result<Self, Error> {
+        let name = path.display().to_string();
+        if path == Path::new(STDOUT) {
+            let output = on_stdout(format, settings.config)?;
+            return Ok(Self { output, name, stored: StoredResults::default(), chain: None });
+        }
+        let (output, mut stored) = open(path, existing, settings)?;
+        let (frames, links) = (stored.frames, Links::read(path, stored.frames, |n| stored.sums_of(n)));
+        let chain = Some(Chain::new(path, links.clone(), frames, |n| stored.sums_of(n)));
+        stored.links = links;
+        Ok(Self { output, name, stored, chain })
     }
 }
 
 impl One {
     /// Compares the rows of a picture with those that the output contains.
     fn compare(&self, frame: &Finished) -> Result<(), Error> {
-        let found = rows(frame, &self.output.config).iter().map(sum).collect::<Result<Vec<u32>, _>>()?;
+        let found = sums(&rows(frame, &self.output.config))?;
         let first = frame.index as usize * found.len();
         if self.stored.sums.get(first..first + found.len()) == Some(found.as_slice()) {
             return Ok(());
@@ -159,7 +197,7 @@ impl One {
     /// the first.
     fn compare_epoch(&self, index: u64, heads: &[Vec<FrameRecord>], with_joint: bool) -> Result<(), Error> {
         let rows = || heads.iter().flatten().map(|record| &record.row);
-        let found = rows().map(sum).collect::<Result<Vec<u32>, _>>()?;
+        let found = sums(rows())?;
         let stored = self.stored.sums_of_epoch(index);
         let is_same = |(k, (a, b)): (usize, (&u32, &u32))| a == b || (k == 0 && !with_joint);
         if stored.len() == found.len() && stored.iter().zip(&found).enumerate().all(is_same) {
@@ -181,6 +219,9 @@ impl Sink for Outputs {
             if self.next < one.stored.frames {
                 one.compare(frame)?;
             } else {
+                if let Some(chain) = &mut one.chain {
+                    chain.add(frame.identity, &sums(&rows(frame, &one.output.config))?)?;
+                }
                 one.output.write(frame)?;
             }
         }
@@ -189,8 +230,15 @@ impl Sink for Outputs {
     }
 
     fn flush(&mut self) -> Result<(), Error> {
+        // First, so that each row in an output is known here.
+        self.flush_chains()?;
         self.each.iter_mut().try_for_each(|one| one.output.flush())
     }
+}
+
+/// Returns the checksums of rows.
+fn sums<'a>(rows: impl IntoIterator<Item = &'a Row>) -> Result<Vec<u32>, Error> {
+    rows.into_iter().map(sum).collect()
 }
 
 /// Returns the outputs in the order in which a picture is written. A recording comes last, because the pixels and the

@@ -2,13 +2,16 @@
 
 use std::ops::Range;
 use std::path::Path;
-use std::time::{Duration, SystemTime};
+use std::time::SystemTime;
 
 use hzn_core::status::Status;
 use hzn_files::rig::JOINT;
 
+use super::chain::Links;
 use crate::checked_row::sum;
 use crate::engine::{LastAnswer, StoredAnswer};
+use crate::source::Payload;
+use crate::source::identity::{changed, digest};
 
 /// The results that an output contains already.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -32,6 +35,8 @@ pub struct StoredResults {
     pub epochs: Vec<StoredEpoch>,
     /// The time of the last write before the output was opened.
     pub written: Option<SystemTime>,
+    /// What the file next to the output says of the pictures and their rows.
+    pub(super) links: Links,
 }
 
 impl StoredResults {
@@ -39,7 +44,23 @@ impl StoredResults {
     /// examined counts as changed, because nothing is known of it.
     pub fn is_older_than(&self, file: &Path) -> bool {
         let Some(written) = self.written else { return true };
-        changed(file).is_none_or(|changed| changed >= written)
+        std::fs::metadata(file).ok().and_then(|data| changed(&data)).is_none_or(|changed| changed >= written)
+    }
+
+    /// Returns whether the pictures with this number were changed since they were processed: the one of a run, or those
+    /// of a rig. What is known of each picture decides; without it, whether a file is newer than the results.
+    pub fn is_changed<'a>(&self, n: u64, pictures: impl Iterator<Item = &'a Payload> + Clone) -> bool {
+        let now = || all_identities(pictures.clone().map(Payload::identity));
+        match self.links.identity(n) {
+            Some(known) => now() != Some(known),
+            None => pictures.clone().filter_map(Payload::file).any(|file| self.is_older_than(file)),
+        }
+    }
+
+    /// Returns the first picture from which on the rows are not those that were written for the pictures, as the file
+    /// next to the output says; `None` if it says nothing against them.
+    pub fn contradicted_from(&self) -> Option<u64> {
+        self.links.contradicted_from().filter(|from| *from < self.frames)
     }
 
     /// Records the answers and checksums of a picture's rows, one row for each body.
@@ -137,6 +158,16 @@ impl StoredResults {
         self.rows += rows.len() as u64;
     }
 
+    /// Returns the checksums of the rows of a picture, or of an epoch of a rig.
+    pub(super) fn sums_of(&self, n: u64) -> &[u32] {
+        if !self.epochs.is_empty() {
+            return self.sums_of_epoch(n);
+        }
+        let each = self.sums.len() / (self.frames as usize).max(1);
+        let first = n as usize * each;
+        self.sums.get(first..first + each).unwrap_or_default()
+    }
+
     /// Returns the checksums of the rows of an epoch.
     pub(super) fn sums_of_epoch(&self, index: u64) -> &[u32] {
         let rows = self.epochs.get(index as usize).map(|epoch| epoch.rows.clone());
@@ -144,19 +175,7 @@ impl StoredResults {
     }
 }
 
-/// Returns when a file got its contents or its place. A copy may keep the time of the original's contents, but not that
-/// of its entry, which a file system without such a time does not have.
-fn changed(file: &Path) -> Option<SystemTime> {
-    let data = std::fs::metadata(file).ok()?;
-    let modified = data.modified().ok()?;
-    #[cfg(unix)]
-    let entered = {
-        use std::os::unix::fs::MetadataExt;
-        let whole = u64::try_from(data.ctime()).ok().map(Duration::from_secs);
-        let part = u64::try_from(data.ctime_nsec()).ok().map(Duration::from_nanos);
-        whole.zip(part).map(|(whole, part)| SystemTime::UNIX_EPOCH + whole + part)
-    };
-    #[cfg(not(unix))]
-    let entered = None;
-    Some(entered.map_or(modified, |entered: SystemTime| entered.max(modified)))
+/// Returns what tells the pictures that belong together from others, if it is known of each.
+pub(crate) fn all_identities(each: impl Iterator<Item = Option<u64>>) -> Option<u64> {
+    each.collect::<Option<Vec<_>>>().filter(|each| !each.is_empty()).map(digest)
 }

@@ -113,19 +113,19 @@ impl Text {
             return Ok((Self::create(path, part, form)?, found.stored, found.damage));
         }
         let mut text = Self::from_file(file, path, part, form);
-        // The rest of the file is an incomplete row or picture. That of a rig may be a complete epoch, which stays
-        // until the same epoch is there to replace it.
+        // The rest of the file is an incomplete row or picture, or with a rig perhaps a complete epoch. It stays until
+        // there is something to replace it, so that a refused run changes nothing.
         text.continue_at = Some(found.end as u64);
-        if !matches!(rows, Grouping::Epochs { .. }) {
-            text.cut()?;
-        }
         Ok((text, found.stored, found.damage))
     }
 
     /// Cuts the file where the next row begins.
     fn cut(&mut self) -> io::Result<()> {
         if let (Some(at), Out::File { file, .. }) = (self.continue_at.take(), &mut self.out) {
-            file.get_ref().set_len(at)?;
+            // Otherwise the file would get a new time without a change.
+            if file.get_ref().metadata()?.len() != at {
+                file.get_ref().set_len(at)?;
+            }
             file.seek(SeekFrom::End(0))?;
         }
         Ok(())

@@ -14,6 +14,7 @@ mod files;
 mod find_tone;
 mod gather;
 mod header;
+pub(crate) mod identity;
 mod input;
 mod item;
 mod jpeg;

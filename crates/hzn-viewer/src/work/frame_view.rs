@@ -318,6 +318,7 @@ impl<'a> FrameInput<'a> {
             tip: None,
             pages: 1,
             mask: None,
+            identity: None,
             bytes: None,
             brightness_by_sun: None,
         }

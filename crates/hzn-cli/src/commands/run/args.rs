@@ -110,6 +110,11 @@ impl Args {
         }
     }
 
+    /// Returns whether pictures are left. Ctrl-C is the only end of a run that waits for them.
+    pub(super) fn has_more(&self, done: u64, total: Option<u64>) -> bool {
+        !self.watch && total.is_none_or(|n| done < n)
+    }
+
     /// Returns the settings of the pictures of one camera.
     ///
     /// # Errors

@@ -66,7 +66,7 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
         }
         Err(error) => return Err(error.into()),
     };
-    output.finish()?;
+    output.finish(end == End::Complete)?;
     let epochs = input.epochs;
     let lost = epochs.describe_loss().filter(|_| end == End::Complete);
     lost.iter().chain(&epochs.warnings()).for_each(tell::warning);

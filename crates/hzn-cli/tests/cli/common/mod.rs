@@ -113,6 +113,15 @@ impl Place {
     }
 }
 
+/// Runs the command under limits of bash, such as `ulimit -v`.
+#[cfg(unix)]
+pub fn limited(place: &Place, limits: &str, args: &[&str]) -> Ran {
+    let hzn = place.command(&[]);
+    let mut shell = Command::new("bash");
+    shell.args(["-c", &format!("{limits}; exec \"$0\" \"$@\"")]).arg(hzn.get_program()).args(args);
+    Ran::from_output(&shell.current_dir(place.path("")).output().unwrap(), &place.path(""))
+}
+
 /// Returns the rows of a CSV text.
 pub fn rows(text: &str) -> Vec<Vec<(String, String)>> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());

@@ -81,6 +81,7 @@ fn finished(time_s: f64, has_cone: bool) -> Finished {
         tip: None,
         pages: 1,
         mask: None,
+        identity: None,
         bytes: None,
         brightness_by_sun: None,
     }
