@@ -1,8 +1,12 @@
 //! The exceptions, one for each family of errors, and a wrapper that turns panics into exceptions.
+//!
+//! Python prints a message as it is, also to a terminal. A message can contain a name or a key from a file, so it is
+//! made harmless here.
 
 use std::ffi::CString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use hzn_run::terminal;
 use pyo3::exceptions::{PyRuntimeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::{PyErr, create_exception};
@@ -18,22 +22,22 @@ create_exception!(hzn, ImageError, HznError, "An array that is no picture, or no
 
 /// Returns the exception for an invalid configuration.
 pub(crate) fn config(what: impl std::fmt::Display) -> PyErr {
-    ConfigError::new_err(what.to_string())
+    ConfigError::new_err(terminal::lines(what))
 }
 
 /// Returns the exception for an invalid picture.
 pub(crate) fn image(what: impl std::fmt::Display) -> PyErr {
-    ImageError::new_err(what.to_string())
+    ImageError::new_err(terminal::lines(what))
 }
 
 /// Returns the exception for all other errors, for example of a file.
 pub(crate) fn other(what: impl std::fmt::Display) -> PyErr {
-    HznError::new_err(what.to_string())
+    HznError::new_err(terminal::lines(what))
 }
 
 /// Issues a warning: work goes on, but the user should check something.
 pub(crate) fn warn(py: Python<'_>, what: impl std::fmt::Display) -> PyResult<()> {
-    let text = CString::new(what.to_string()).unwrap_or_default();
+    let text = CString::new(terminal::lines(what)).unwrap_or_default();
     PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)
 }
 

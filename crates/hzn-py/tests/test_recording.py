@@ -58,3 +58,33 @@ def test_a_recording_that_was_cut_off_warns(recording):
     assert 0 < len(table["file"]) < 50
     with pytest.warns(UserWarning, match="was cut off"), hzn.open_mcap(cut) as opened:
         assert len(list(opened)) == len(table["file"])
+
+
+def test_a_recording_in_an_unknown_compression_warns(recording):
+    other = recording.with_name("other.mcap")
+    # The name of the compression in each chunk, after its length.
+    other.write_bytes(recording.read_bytes().replace(b"\x04\0\0\0zstd", b"\x04\0\0\0zstx"))
+    with pytest.warns(UserWarning, match='"zstx"'):
+        assert len(hzn.read_mcap(other)["file"]) == 0
+    with pytest.warns(UserWarning, match='"zstx"'), hzn.open_mcap(other) as opened:
+        assert list(opened) == []
+
+
+def test_no_message_has_what_a_terminal_obeys(recording, tmp_path):
+    evil = "\x1b]52;c;aGk\x07\x9b31m\u202e\u2066\x7f"
+    shown = r"\x1b]52;c;aGk\x07\x9b31m\u{202e}\u{2066}\x7f"
+    sensor = tmp_path / "evil.toml"
+    escaped = "".join(f"\\u{ord(c):04x}" if not (c.isascii() and c.isprintable()) else c for c in evil)
+    sensor.write_text((recording.parent / "sensor.toml").read_text() + f'["{escaped}"]\na = 1\n')
+    with pytest.raises(hzn.ConfigError) as refused:
+        hzn.Sensor.from_toml(sensor)
+    assert shown in str(refused.value) and evil not in str(refused.value)
+    with pytest.raises(hzn.HznError) as refused:
+        hzn.read_mcap(tmp_path / f"{evil}.mcap")
+    assert shown in str(refused.value) and "\x1b" not in str(refused.value)
+    cut = tmp_path / f"{evil}.mcap"
+    cut.write_bytes(recording.read_bytes()[:-20_000])
+    with pytest.warns(UserWarning) as warned:
+        hzn.read_mcap(cut)
+    assert [str(warning.message) for warning in warned] != []
+    assert not any(c in str(warning.message) for warning in warned for c in evil if c not in shown)

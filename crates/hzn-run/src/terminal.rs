@@ -54,6 +54,13 @@ impl FileOnStdout {
     }
 }
 
+impl<W> FileOnStdout<W> {
+    /// Returns whether stdout is a terminal.
+    pub fn is_terminal(&self) -> bool {
+        self.is_terminal
+    }
+}
+
 impl Default for FileOnStdout {
     fn default() -> Self {
         Self::new()

@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow, bail};
 use egui::{ColorImage, ScreenshotCallback, ViewportCommand};
+use hzn_mcap::Row;
+use hzn_run::terminal;
 
 use crate::args::Args;
 use crate::measure::Measure;
@@ -246,11 +248,15 @@ impl Window {
 /// Prints what the window shows, one line for each body.
 fn print_answers(viewer: &Viewer) {
     let Some(frame_view) = viewer.frame_view() else { return };
-    let rows = frame_view.answers.first().into_iter().flat_map(|o| &o.bodies).map(|b| &b.row);
-    for row in rows {
-        let axis = row.axis().map_or_else(|| "-".to_owned(), |[x, y, z]| format!("{x} {y} {z}"));
-        println!("frame {} {} {} {} {axis}", frame_view.index, frame_view.name, row.body, row.status);
+    for body in frame_view.answers.first().into_iter().flat_map(|o| &o.bodies) {
+        println!("{}", answer_line(frame_view.index, &frame_view.name, &body.row));
     }
+}
+
+/// Returns an answer as a line. The names can come from a recording.
+fn answer_line(index: usize, name: &str, row: &Row) -> String {
+    let axis = row.axis().map_or_else(|| "-".to_owned(), |[x, y, z]| format!("{x} {y} {z}"));
+    terminal::one_line(format_args!("frame {index} {name} {} {} {axis}", row.body, row.status))
 }
 
 fn save(image: &ColorImage, path: &Path) -> anyhow::Result<()> {
@@ -272,6 +278,16 @@ mod tests {
         assert!(is_too_large(size(1442.0, 932.0), size(1440.0, 900.0)));
         assert!(is_too_large(size(1024.0, 700.0), size(1024.0, 768.0)));
         assert!(!is_too_large(size(1442.0, 932.0), size(1920.0, 1080.0)));
+    }
+
+    #[test]
+    fn an_answer_prints_nothing_that_a_terminal_obeys() {
+        let name = "\u{1b}]52;c;aGk\u{7}\u{202e}.png".to_owned();
+        let meta =
+            hzn_mcap::RowMeta { index: 3, file: name, time_s: None, body: "\u{9b}31m\n".into(), altitude_km: None };
+        let row = Row::unprocessed(&meta, hzn_core::status::Status::NoLimb, "");
+        let line = answer_line(3, &meta.file, &row);
+        assert_eq!(line, r"frame 3 \x1b]52;c;aGk\x07\u{202e}.png \x9b31m\n no-limb -");
     }
 
     #[test]

@@ -54,7 +54,7 @@ fn find(command: Command, words: &[String]) -> Result<Command, Stop> {
         None => {
             let names: Vec<&str> = command.get_subcommands().map(Command::get_name).collect();
             let known = if names.is_empty() { "it has no commands".to_owned() } else { names.join(", ") };
-            Err(usage(format!("{} has no command {word:?}: {known}", command.get_name())))
+            Err(usage(format!("{} has no command \"{word}\": {known}", command.get_name())))
         }
     })
 }

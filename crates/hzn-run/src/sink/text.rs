@@ -11,7 +11,7 @@ use super::stored::StoredResults;
 use crate::checked_row::{csv_line, from_csv, from_json, header, json_line};
 use crate::disk::run_advice;
 use crate::error::{Error, failed};
-use crate::terminal::FileOnStdout;
+use crate::terminal::{FileOnStdout, one_line};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Form {
@@ -137,7 +137,15 @@ impl Text {
             Form::Csv => csv_line(row),
             Form::Jsonl => json_line(row),
         };
-        self.out.writer().write_all(&line.map_err(io::Error::other)?)
+        let mut line = line.map_err(io::Error::other)?;
+        if let Out::Stdout(out) = &self.out
+            && out.get_ref().is_terminal()
+        {
+            // A line break within a name would begin a line that looks like one of hzn.
+            let row = String::from_utf8_lossy(line.strip_suffix(b"\n").unwrap_or(&line));
+            line = (one_line(row) + "\n").into_bytes();
+        }
+        self.out.writer().write_all(&line)
     }
 
     pub(crate) fn flush(&mut self) -> io::Result<()> {

@@ -113,6 +113,14 @@ impl Place {
     }
 }
 
+/// Returns the names of the commands that a help lists.
+pub fn commands(place: &Place, args: &[&str]) -> Vec<String> {
+    let help = place.run(args).expect(0).out;
+    let list = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap().to_owned();
+    let names = list.lines().filter(|line| !line.starts_with("   ")).map(|line| line.trim().split(' ').next());
+    names.map(|name| name.unwrap().to_owned()).collect()
+}
+
 /// Runs the command under limits of bash, such as `ulimit -v`.
 #[cfg(unix)]
 pub fn limited(place: &Place, limits: &str, args: &[&str]) -> Ran {
