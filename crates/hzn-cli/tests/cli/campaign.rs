@@ -79,7 +79,7 @@ fn killed_at_random_moments() {
 
 /// Returns the processor time of a process in ticks, from its file `stat`.
 #[cfg(target_os = "linux")]
-fn processor_ticks(stat: &str) -> Option<u64> {
+pub(crate) fn processor_ticks(stat: &str) -> Option<u64> {
     let text = std::fs::read_to_string(stat).ok()?;
     // The name of the program is in parentheses; utime and stime are the 12th and 13th field after it.
     let mut fields = text.rsplit_once(')')?.1.split_whitespace().skip(11);

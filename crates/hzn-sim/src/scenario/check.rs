@@ -45,10 +45,13 @@ impl Scenario {
     /// # Errors
     /// Returns the first value that is out of its limits, with the limit.
     pub fn check(&self) -> Result<(), ScenarioError> {
-        if self.name.is_empty() || !self.name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) {
+        let is_name = |name: &str| name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c));
+        // A program would take such a picture as an option, and a spreadsheet as a formula.
+        if self.name.is_empty() || self.name.starts_with('-') || !is_name(&self.name) {
             return Err(ScenarioError::new(
                 "name",
-                "must consist of letters, digits, '-', '_' and '.': the names of the pictures begin with it",
+                "must consist of letters, digits, '-', '_' and '.', and not begin with '-': the names of the pictures \
+                 begin with it",
             ));
         }
         if utc::unix_s(&self.utc).is_none() {
