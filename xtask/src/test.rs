@@ -172,12 +172,14 @@ fn read_files_with_other_readers(steps: &mut Steps) -> Outcome {
     let mut files = find_recordings(&demo_dir());
     files.push(sample);
     steps::run(Command::new(&python).arg("tests/python/check_mcap.py").args(files))?;
-    let folder = target().join("xtask").join("ros");
-    if folder.exists() {
-        fs::remove_dir_all(&folder)?;
+    for (script, folder) in [("check_rewritten.py", "rewritten"), ("check_ros.py", "ros")] {
+        let folder = target().join("xtask").join(folder);
+        if folder.exists() {
+            fs::remove_dir_all(&folder)?;
+        }
+        let script = Path::new("tests/python").join(script);
+        steps::run(Command::new(&python).arg(script).arg(target().join("debug/hzn")).arg(folder))?;
     }
-    let program = target().join("debug/hzn");
-    steps::run(Command::new(&python).arg("tests/python/check_ros.py").arg(program).arg(folder))?;
     let folder = target().join("xtask").join("navigation");
     let programs = ["debug/hzn", "debug/examples/flight"].map(|program| target().join(program));
     steps::run(Command::new(&python).arg("tests/python/check_nav.py").args(programs).arg(folder))?;
