@@ -1,8 +1,10 @@
 """Tests of an archive on a real cluster of two processes."""
 
 import csv
+import importlib.util
 import math
 import os
+import re
 import shutil
 import signal
 import threading
@@ -190,8 +192,11 @@ def test_an_archive_in_an_object_store(client, archive, small, bucket, slow_down
     assert all(shard.startswith("s3://flights/out/a/part-") for shard in result.shards)
     assert [f["file"] for f in result.failed] == urls[-1:]
     tables = [parquet.read_table(files.open(shard)).to_pydict() for shard in result.shards]
-    found = [axis for table in tables for axis in table["axis_y"]]
-    assert found[:-1] == [small.process(np.ascontiguousarray(limb(i)[::4, ::4])).to_dict()["axis_y"] for i in range(30)]
+    serial = [report.to_dict() for report in small.process_many(archive[:30])]
+    assert [file for table in tables for file in table["file"]] == urls
+    for name in set(serial[0]) - {"file", "elapsed_us"}:
+        found = [cell for table in tables for cell in table[name]]
+        assert found[:-1] == [row[name] for row in serial], name
     assert sum(slow_down) >= 3
     # Another program removes a shard and leaves the unfinished file of a worker; the next run makes what is missing.
     store = fsspec.filesystem("s3", skip_instance_cache=True)
@@ -201,6 +206,11 @@ def test_an_archive_in_an_object_store(client, archive, small, bucket, slow_down
     assert (again.shards, again.skipped) == (result.shards, 1)
     store.invalidate_cache()
     assert sorted(store.ls("flights/out/a")) == sorted(shard.removeprefix("s3://") for shard in result.shards)
+    # Another picture of the same size under one key has another ETag.
+    assert os.path.getsize(archive[3]) == os.path.getsize(archive[0])
+    store.put_file(archive[3], urls[0].removeprefix("s3://"))
+    replaced = process_archive(urls, small, client=client, out=f"{bucket}/out/a", shard_frames=20, retries=0)
+    assert (replaced.skipped, replaced.shards[1]) == (1, result.shards[1]) and replaced.shards[0] != result.shards[0]
     for out in (f"{bucket}/out/m", bucket):
         recorded = process_archive(urls, small, client=client, out=out, format="mcap", retries=0)
         assert [f["file"] for f in recorded.failed] == urls[-1:]
@@ -384,3 +394,28 @@ def test_a_progress_bar_says_how_long_it_takes(client, archive, small, tmp_path,
     process_archive(archive[:80], small, client=client, out=str(tmp_path), shard_frames=40, progress=True)
     shown = capsys.readouterr().err
     assert "80/80" in shown and "pictures/s" in shown and "failed=1" in shown
+    # The time since the start, and the time left.
+    assert re.search(r"\[\d\d:\d\d<\d\d:\d\d", shown), shown
+
+
+def test_a_cluster_that_runs_already(client, archive, small, tmp_path):
+    address = client.scheduler.address
+    assert address.startswith("tcp://")
+    # The client that is the current one need not be given.
+    with distributed.Client(address):
+        result = process_archive(archive[:4], small, out=str(tmp_path))
+    assert columns(result)["file"] == archive[:4] and result.failed == []
+
+
+def test_without_pyarrow_there_is_csv(client, archive, small, tmp_path, monkeypatch):
+    find = importlib.util.find_spec
+
+    def without(name, *more):
+        return None if name == "pyarrow" else find(name, *more)
+
+    monkeypatch.setattr(importlib.util, "find_spec", without)
+    with pytest.raises(ImportError, match='"hzn-sensor\\[dask\\]", or choose csv'):
+        process_archive(archive[:2], small, client=client, out=str(tmp_path / "parquet"))
+    assert not (tmp_path / "parquet").exists()
+    result = process_archive(archive[:2], small, client=client, out=str(tmp_path / "csv"), format="csv")
+    assert result.failed == [] and result.shards[0].endswith(".csv")
