@@ -84,20 +84,25 @@ fn repository(database: &Path) -> Result<PathBuf, Trouble> {
     Ok(copy)
 }
 
-/// Prints the parts of which the registry has a newer version, or whose version was yanked. Neither is a fault.
+/// Prints the parts of which the registry has a newer version. That is no fault, so nothing fails if it cannot be
+/// asked. cargo-audit names the parts whose version was yanked.
 fn list_old() -> Outcome {
-    // Nothing is written, but `--locked` would refuse a newer version.
-    let mut update = Command::new(steps::cargo_program());
-    // cargo writes its list to stderr.
-    let listed = update.args(["update", "--dry-run", "--verbose"]).output()?;
-    let text = String::from_utf8_lossy(&listed.stderr);
-    if !listed.status.success() {
-        println!("the registry cannot be asked for newer versions: {}", text.trim());
-        return Ok(());
+    for lock in LOCKS {
+        // Nothing is written, but `--locked` would refuse a newer version.
+        let mut update = Command::new(steps::cargo_program());
+        update.args(["update", "--dry-run", "--verbose", "--manifest-path"]);
+        // cargo writes its list to stderr.
+        let listed = update.arg(Path::new(lock).with_file_name("Cargo.toml")).output()?;
+        let text = String::from_utf8_lossy(&listed.stderr);
+        if !listed.status.success() {
+            println!("{lock}: the registry cannot be asked for newer versions: {}", text.trim());
+            continue;
+        }
+        let is_part =
+            |line: &&str| ["Updating ", "Downgrading ", "Unchanged "].iter().any(|word| line.starts_with(word));
+        let parts: Vec<&str> = text.lines().map(str::trim).filter(is_part).filter(|line| line.contains(" v")).collect();
+        println!("{lock}: {} parts have a newer version:", parts.len());
+        parts.iter().for_each(|part| println!("  {part}"));
     }
-    let is_part = |line: &&str| ["Updating ", "Downgrading ", "Unchanged "].iter().any(|word| line.starts_with(word));
-    let parts: Vec<&str> = text.lines().map(str::trim).filter(is_part).filter(|line| line.contains(" v")).collect();
-    println!("{} parts have a newer version or were yanked (\"Downgrading\"):", parts.len());
-    parts.iter().for_each(|part| println!("  {part}"));
     Ok(())
 }
