@@ -9,6 +9,7 @@ use hzn_core::body::{Kind, Night};
 use hzn_core::camera::{self, Model};
 use hzn_core::frames::{Cam, Fixed, Rotation, UnitVec3};
 use hzn_core::image::{Grey, Layout};
+use hzn_core::tone::Tone;
 use hzn_core::{Config, HostHorizon, Prior, Report, consensus, covariance, edge_points, fit};
 
 const SIZE: [u16; 2] = [320, 240];
@@ -195,24 +196,36 @@ fn of_limbs_that_are_bent_or_cut() {
 fn of_the_layer_of_airglow() {
     let (mut config, mut table) = (earth_sensor(), Table::new("airglow"));
     config.body.night = Night::Airglow;
-    let prior = Prior { sun_elevation_rad: Some(-0.6), ..Prior::default() };
-    // The picture is drawn about the edge of the layer, 102 km above the ground.
-    let layer = |km: f64, trough: f64| {
-        let inside = (km + 8.0) / 8.0;
-        if inside < 0.0 { trough + (1.0 - trough) * libm::exp(inside / 4.0) } else { libm::exp(-inside * inside) }
+    let prior = Prior { sun_elevation_rad: Some(-1.0), ..Prior::default() };
+    config.input.tone = Some(Tone::Linear);
+    // The light along a line of sight with this tangent height, through a layer with its peak at 97 km.
+    let emission = |height_km: f64| {
+        let z = (height_km - 97.0) / 5.0;
+        libm::exp(1.0 - z - libm::exp(-z))
     };
-    for trough in [0.1, 0.4, 0.7, 0.8, 0.85, 0.9, 1.0] {
-        let data = earth(|km, _| 5.0 + 150.0 * layer(km - 85.0, trough));
-        table.add(&format!("trough {trough}"), &process(&config, &prior, &data));
+    let way = |tangent_km: f64, km: i32| libm::sqrt((6371.0 + tangent_km).powi(2) + f64::from(km * km)) - 6371.0;
+    let glow: Vec<f64> = (-300..300)
+        .map(|tangent_km| (0..800).map(|k| emission(way(f64::from(tangent_km), 2 * k))).sum::<f64>() / 500.0)
+        .collect();
+    let layer = |tangent_km: f64| {
+        let at = (tangent_km + 300.0).clamp(0.0, 598.0);
+        let (k, part) = (at as usize, at.fract());
+        glow[k] * (1.0 - part) + glow[k + 1] * part
+    };
+    // Behind the ground no light is seen: half of the line is left.
+    let seen = |km: f64, ground: f64| if km < 0.0 { 0.5 * layer(km) + ground } else { layer(km) };
+    let mut add = |what: String, ground: f64, along: &dyn Fn(f64) -> f64| {
+        let data = earth(|km, [u, _]| 5.0 + 240.0 * (seen(km + 17.0, ground) * along(u)).min(1.0));
+        table.add(&what, &process(&config, &prior, &data));
+    };
+    for ground in [0.01, 0.1, 0.3, 0.6, 1.0] {
+        add(format!("ground {ground}"), ground, &|_| 1.0);
     }
-    for uneven in [0.1, 0.2, 0.3, 0.4, 0.5] {
-        let along = |u: f64| 1.0 - uneven + uneven * libm::sin(u / 7.0);
-        let data = earth(|km, [u, _]| 5.0 + 150.0 * layer(km - 85.0, 0.2) * along(u));
-        table.add(&format!("uneven {uneven}"), &process(&config, &prior, &data));
+    for uneven in [0.1, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5] {
+        add(format!("uneven {uneven}"), 0.01, &|u| 1.0 - uneven * (1.0 - libm::sin(u / 7.0)));
     }
-    for rise_km in [20.0, 40.0, 50.0, 60.0, 80.0] {
-        let data = earth(|km, _| 5.0 + if km < 85.0 - rise_km { 130.0 } else { 150.0 * layer(km - 85.0, 0.2) });
-        table.add(&format!("rise {rise_km}"), &process(&config, &prior, &data));
+    for from_px in [5.0, 10.0, 15.0, 20.0, 60.0, 120.0, 200.0] {
+        add(format!("dark until {from_px}"), 0.01, &|u| f64::from(u8::from(u >= from_px)));
     }
     table.check();
 }

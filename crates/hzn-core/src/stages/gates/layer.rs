@@ -1,18 +1,20 @@
 //! Gate: the edge of the airglow is that of a layer. Below it the light becomes less again, down to the ground, whose
 //! own edge may be seen in moonlight. The ground itself, clouds and the lights of most cities have no such trough.
 //!
-//! A line of cities along a coast has one. But nothing stands above the layer, so that its edge is seen along the whole
+//! A line of cities along a coast has one. But nothing stands above the layer, so that its light is seen along the whole
 //! limb, and a line of sight runs through 700 km of it, so that its light changes little along a picture. A line of
-//! cities has gaps, or lights of every brightness.
+//! cities ends, has gaps, or has lights of every brightness.
 //!
 //! The gate `glow` asks for no light beyond the edge. Where the picture ends next to the edge, the layer may be outside
 //! of it, and the edge that of the ground; so the sky beyond the edge must be in view.
 
 use super::case::{Case, refuse_if};
-use super::places::{MAX_PLACES, Place, Places, inliers, mean_brightness, place_of};
+use super::places::{MAX_PLACES, Place, Places, mean_brightness, sum_about};
 use super::sky::Sky;
+use crate::base::linalg::basis;
 use crate::base::median;
 use crate::base::real::Real;
+use crate::geometry::frames::UnitVec3;
 use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::model::verdict::Verdict;
@@ -38,11 +40,11 @@ const LAST_DARK: usize = 8;
 /// that show it. The layer is as bright everywhere along a picture; ground and clouds are not.
 const TROUGH_OF_PLACE: f64 = 0.92;
 const EVERYWHERE: f64 = 0.9;
-/// Number of places at which the light of the layer is compared, the smallest light of a place as a part of their
-/// median, and the smallest part of the places that have it.
+/// Number of places around the limb at which the light of the layer is compared, the smallest light of a place as a part
+/// of their median, and the smallest part of the places in view that have it.
 // Waves change the light of a layer by some tens of percent. Of 91 drawn layers, whose light is that of their geometry
-// and the noise, the darkest twentieth of the places has 0.75 of the median or more.
-const COMPARED: usize = 48;
+// and the noise, the darkest twentieth of the edge has 0.75 of the median or more.
+const AROUND: usize = 256;
 const EVEN: f64 = 0.5;
 const MOST_EVEN: f64 = 0.95;
 /// First place at which the light may rise again to half of the depth of the trough. The edge of a layer is at least
@@ -71,7 +73,6 @@ pub(super) fn refuse<T: Real, P: Pixels, O: Observer<T>>(
     let is_sky_shown =
         |place: &&Place<T>| mean_brightness(place, -step_px(place) * T::from_f64(SKY_STEPS), binary).is_some();
     let is_layer = !P::STREAMED
-        && case.cover.share >= T::from_f64(EVERYWHERE)
         && places.iter().filter(is_sky_shown).count() >= LEAST
         && profile(case, binary, places)
             .is_some_and(|light| has_trough(&light, sky) && is_everywhere(&light, case, binary, places, sky));
@@ -144,23 +145,30 @@ fn is_everywhere<T: Real, P: Pixels, O: Observer<T>>(
         && is_even(most.0, case, binary, sky)
 }
 
-/// Returns whether the layer is about as bright at all places, at the depth at which the profile is brightest.
+/// Returns whether the layer is about as bright along the whole limb in view, at the depth at which the profile is
+/// brightest. The threshold may have left out a part of the edge, so that the places are those of the fitted limb.
 fn is_even<T: Real, P: Pixels, O: Observer<T>>(
     depth: i32,
     case: &Case<'_, T>,
     binary: &BinaryPicture<'_, T, P, O>,
     sky: &Sky<T>,
 ) -> bool {
-    let inwards = step(case) * T::from_i32(depth);
-    let mut lights = heapless::Vec::<u16, COMPARED>::new();
-    for (block, lane) in inliers(case.blocks, case.fit.inliers, COMPARED) {
-        let _ = place_of(block, lane, &case.fused.e, case.camera)
-            .and_then(|place| mean_brightness(&place, inwards / place.by_px, binary))
+    let (b1, b2) = basis(&case.fused.e);
+    let cos = (case.fused.c + step(case) * T::from_i32(depth)).min(T::one());
+    let sin = (T::one() - cos * cos).max(T::ZERO).sqrt();
+    let mut lights = heapless::Vec::<u16, AROUND>::new();
+    for k in 0..AROUND {
+        let (s, c) = T::from_f64(k as f64 * core::f64::consts::TAU / AROUND as f64).sin_cos();
+        let direction = case.fused.e * cos + (b1 * c + b2 * s) * sin;
+        let _ = case
+            .camera
+            .project(&UnitVec3::assume_unit(direction))
+            .and_then(|at| u16::try_from(sum_about([at.u, at.v], binary)? / 9).ok())
             .map(|light| lights.push(light));
     }
-    let above_sky = |light: T| (light - sky.median).max(T::ZERO);
-    let least = above_sky(T::from_i32(median::median_of_counts(&lights).into())) * T::from_f64(EVEN);
-    let even = lights.iter().filter(|&&light| above_sky(T::from_i32(light.into())) >= least).count();
+    let above_sky = |light: u16| (T::from_i32(light.into()) - sky.median).max(T::ZERO);
+    let least = above_sky(median::median_of_counts(&lights)) * T::from_f64(EVEN);
+    let even = lights.iter().filter(|&&light| above_sky(light) >= least).count();
     T::from_i32(even as i32) >= T::from_i32(lights.len() as i32) * T::from_f64(MOST_EVEN)
 }
 

@@ -46,17 +46,12 @@ pub(super) type Places<T> = heapless::Vec<Place<T>, MAX_PLACES>;
 pub(super) fn along_limb<T: Real>(e: &V3<T>, blocks: &[Block<T>], count: u32, camera: &Camera<T>) -> Places<T> {
     let mut places = Places::new();
     inliers(blocks, count, MAX_PLACES).for_each(|(block, lane)| {
-        let _ = place_of(block, lane, e, camera).map(|place| places.push(place));
+        let Some(from) = camera.project(&UnitVec3::assume_unit(block.ray(lane))) else { return };
+        let [gu, gv] = block.gradient_at(lane, e);
+        let by_px = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));
+        let _ = places.push(Place { from: [from.u, from.v], inwards: [gu / by_px, gv / by_px], by_px });
     });
     places
-}
-
-/// Returns the place on the limb about `e` at an edge point.
-pub(super) fn place_of<T: Real>(block: &Block<T>, lane: usize, e: &V3<T>, camera: &Camera<T>) -> Option<Place<T>> {
-    let from = camera.project(&UnitVec3::assume_unit(block.ray(lane)))?;
-    let [gu, gv] = block.gradient_at(lane, e);
-    let by_px = (gu * gu + gv * gv).sqrt().max(T::from_f64(1e-20));
-    Some(Place { from: [from.u, from.v], inwards: [gu / by_px, gv / by_px], by_px })
 }
 
 /// Returns the mean brightness of nine pixels at this distance inwards of a place, in pixels; `None` outside of the
@@ -75,8 +70,16 @@ pub(super) fn sum_of_nine<T: Real, P: Pixels, O: Observer<T>>(
     inwards_px: T,
     binary: &BinaryPicture<'_, T, P, O>,
 ) -> Option<u32> {
+    sum_about(place.inwards_by(inwards_px), binary)
+}
+
+/// Returns the sum of the nine pixels about an image point; `None` outside of the region.
+pub(super) fn sum_about<T: Real, P: Pixels, O: Observer<T>>(
+    at: [T; 2],
+    binary: &BinaryPicture<'_, T, P, O>,
+) -> Option<u32> {
     let half = T::from_f64(0.5);
-    let [x, y] = place.inwards_by(inwards_px).map(|at| at + half);
+    let [x, y] = at.map(|at| at + half);
     if !(x >= T::one() && y >= T::one()) {
         return None;
     }
