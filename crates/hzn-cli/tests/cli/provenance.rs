@@ -1,5 +1,9 @@
 //! The version, the command and the sensor that overlays, reports and exports name.
 
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
 use crate::common::Place;
 
 /// Height of the pictures of [`Place::with_pictures`], in pixels.
@@ -45,4 +49,36 @@ fn an_overlay_names_its_sensor() {
     let first = differs.iter().min().unwrap();
     assert!(*first > HEIGHT, "the picture and its answer are the same");
     assert!(own.height() - first < 20, "only the last line differs: {first} of {}", own.height());
+}
+
+/// The commit of a package is the one that cargo wrote into it. The repository of another project, into which the
+/// package was copied, has commits of its own.
+#[test]
+fn the_commit_of_a_package_is_not_that_of_the_folder_around_it() {
+    let place = tempfile::tempdir().unwrap();
+    let program = place.path().join("build-script");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("build.rs");
+    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let compiled = Command::new(rustc).args(["--edition", "2024", "-o"]).arg(&program).arg(&source).status().unwrap();
+    assert!(compiled.success());
+    let package = place.path().join("vendor/hzn-cli");
+    fs::create_dir_all(&package).unwrap();
+    fs::copy(&source, package.join("build.rs")).unwrap();
+    for args in [
+        &["init", "--quiet"][..],
+        &["-c", "user.name=n", "-c", "user.email=e", "commit", "--quiet", "--allow-empty", "-m", "theirs"],
+    ] {
+        assert!(Command::new("git").args(args).current_dir(place.path()).status().unwrap().success());
+    }
+    let commit = || {
+        let mut run = Command::new(&program);
+        let out = run.current_dir(&package).env_remove("HZN_COMMIT").output().unwrap();
+        let text = String::from_utf8(out.stdout).unwrap();
+        text.lines().find_map(|line| line.strip_prefix("cargo:rustc-env=HZN_BUILD_COMMIT=")).unwrap().to_owned()
+    };
+    assert_eq!(commit(), "unknown");
+    let told =
+        "{\n  \"git\": {\n    \"sha1\": \"0123456789abcdef0123456789abcdef01234567\"\n  },\n  \"path_in_vcs\": \"\"\n}";
+    fs::write(package.join(".cargo_vcs_info.json"), told).unwrap();
+    assert_eq!(commit(), "0123456789ab");
 }

@@ -1,6 +1,10 @@
 //! Tests of `hzn run`: inputs, outputs, order, and messages.
 
-use crate::common::{Place, cell, without_time};
+use hzn_core::image::{Grey, Layout};
+use hzn_core::{HostHorizon, Prior};
+use hzn_host::Compiled;
+
+use crate::common::{Place, cell, limb, without_time};
 
 #[test]
 fn a_folder_gives_a_table_in_order_with_every_number_of_threads() {
@@ -15,6 +19,33 @@ fn a_folder_gives_a_table_in_order_with_every_number_of_threads() {
         assert_eq!(cell(row, "file"), format!("{i:04}.png"));
         assert_eq!((cell(row, "status"), cell(row, "time_s")), ("ok", format!("{i}.0").as_str()));
     }
+}
+
+/// A row has each digit of the answer that a program gets from hzn-core: nothing on the way normalises it again.
+#[test]
+fn a_row_has_the_digits_of_the_library() {
+    let place = Place::without_tone();
+    let config = hzn_files::sensor::load(&place.path("in/sensor.toml")).unwrap().config;
+    let mut horizon = HostHorizon::boxed(&config).unwrap();
+    let mut longer_than_rounding = 0;
+    for shift in 0..12 {
+        let picture = limb(320, 240, f64::from(shift));
+        picture.save(place.path("in/limb.png")).unwrap();
+        let grey = Grey::try_new(picture.as_raw(), Layout::packed(320, 240, 1, 8)).unwrap();
+        let expected = horizon.expect(&Prior::default()).unwrap();
+        let answer = horizon.find(&grey, &expected).solution.unwrap();
+        let rows = without_time(&place.run(&["run", "in"]).expect(0).out);
+        let numbers =
+            |names: &[&str]| names.iter().map(|n| cell(&rows[0], n).parse::<f64>().unwrap()).collect::<Vec<_>>();
+        let [x, y, z] = answer.axis.xyz();
+        assert_eq!(numbers(&["axis_x", "axis_y", "axis_z"]), [x, y, z]);
+        let upper = numbers(&["cov_xx", "cov_xy", "cov_xz", "cov_yy", "cov_yz", "cov_zz"]);
+        assert_eq!(upper, answer.covariance.upper_rad2);
+        assert_eq!(numbers(&["half_angle_deg"]), [answer.half_angle_rad.to_degrees()]);
+        let length = (x * x + y * y + z * z).sqrt();
+        longer_than_rounding += u32::from([x / length, y / length, z / length] != [x, y, z]);
+    }
+    assert!(longer_than_rounding > 0, "another normalisation would change none of these answers");
 }
 
 #[test]
