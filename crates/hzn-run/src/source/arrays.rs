@@ -186,6 +186,7 @@ fn fits(head: &[u8]) -> Result<Array, String> {
 
 /// Returns width and height of a TIFF whose grey samples have 32 or 64 bits. `None` for every other TIFF.
 // Each type of reader would compile the decoder again, so all of them come as this one.
+#[cfg(feature = "recordings")]
 pub(super) fn wide_tiff_size(contents: &mut dyn Contents) -> Option<(u32, u32)> {
     let mut decoder = tiff::decoder::Decoder::new(contents).ok()?;
     matches!(decoder.colortype().ok()?, tiff::ColorType::Gray(32 | 64)).then(|| decoder.dimensions().ok())?
@@ -195,6 +196,7 @@ pub(super) fn wide_tiff_size(contents: &mut dyn Contents) -> Option<(u32, u32)> 
 ///
 /// # Errors
 /// The reason why it cannot be decoded.
+#[cfg(feature = "recordings")]
 pub(super) fn decode_wide_tiff(
     bytes: &[u8],
     expected: Option<(u32, u32)>,
@@ -227,6 +229,17 @@ pub(super) fn decode_wide_tiff(
         Ok(Picture::new(Samples::Words(words_from_floats(&values)?), Layout::packed(width, height, 1, 16)))
     };
     Some(read())
+}
+
+/// There is no decoder of TIFF, so no TIFF is one of these.
+#[cfg(not(feature = "recordings"))]
+pub(super) fn wide_tiff_size(_: &mut dyn Contents) -> Option<(u32, u32)> {
+    None
+}
+
+#[cfg(not(feature = "recordings"))]
+pub(super) fn decode_wide_tiff(_: &[u8], _: Option<(u32, u32)>, _: &mut Held) -> Option<Result<Picture, String>> {
+    None
 }
 
 #[cfg(test)]

@@ -20,6 +20,13 @@ const SLACK: u64 = 16 << 20;
 /// Largest number of scans in a JPEG. An encoder writes about ten. Each takes as long as the whole picture.
 const MAX_SCANS: usize = 100;
 
+/// The formats that can be decoded.
+const SUPPORTED: &str = if cfg!(feature = "recordings") {
+    "PNG, JPEG, TIFF, PNM, BMP, WebP, FITS, NumPy"
+} else {
+    "PNG, JPEG, FITS, NumPy"
+};
+
 /// What helps against samples of a kind that is not supported, for example numbers with 32 bits in a TIFF.
 const SAMPLES: &str = "scale its samples to whole numbers of 8 or 16 bits";
 
@@ -60,8 +67,8 @@ pub(super) fn read_file_holding(path: &Path, held: &mut Held) -> Result<Vec<u8>,
     if bytes.is_empty() { Err("file is empty".into()) } else { Ok(bytes) }
 }
 
-/// Decodes PNG, JPEG, TIFF, PNM, BMP, WebP, one plane of FITS, or an array of NumPy. Palettes become colour, and CMYK
-/// becomes RGB. If a file contains several pictures, the first is decoded. `expected` is the
+/// Decodes PNG, JPEG, one plane of FITS, or an array of NumPy, and with the feature `recordings` TIFF, PNM, BMP and WebP.
+/// Palettes become colour, and CMYK becomes RGB. If a file contains several pictures, the first is decoded. `expected` is the
 /// camera's size in pixels: a picture of another size is refused before anything large is decoded.
 ///
 /// # Errors
@@ -79,7 +86,7 @@ pub(super) fn decode_holding(bytes: &[u8], expected: Option<(u32, u32)>, held: &
     reader.limits(limits(SLACK));
     let format = reader.format().filter(ImageFormat::reading_enabled).ok_or_else(|| {
         let found = name_foreign(bytes).map(|name| format!("; it is {name}: convert it")).unwrap_or_default();
-        format!("is not a picture of a supported format (PNG, JPEG, TIFF, PNM, BMP, WebP, FITS, NumPy){found}")
+        format!("is not a picture of a supported format ({SUPPORTED}){found}")
     })?;
     if format == ImageFormat::Tiff
         && let Some(picture) = arrays::decode_wide_tiff(bytes, expected, held)

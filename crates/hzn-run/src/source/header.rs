@@ -1,6 +1,8 @@
 //! Facts from the header of a picture file, without its pixels.
 
-use std::io::{BufReader, Read, Seek};
+#[cfg(feature = "recordings")]
+use std::io::BufReader;
+use std::io::{Read, Seek};
 use std::path::Path;
 
 use image::ImageDecoder;
@@ -61,10 +63,17 @@ pub(super) fn has_words(mut contents: impl Read + Seek) -> bool {
 
 /// Returns whether the header gives a white value below 65535, as a PNM can. The decoder then scales the samples to all
 /// 16 bits.
+#[cfg(feature = "recordings")]
 pub(super) fn has_white_value(contents: impl Read) -> bool {
     use image::codecs::pnm::PnmDecoder;
     let decoder = PnmDecoder::new(BufReader::new(contents));
     decoder.is_ok_and(|d| d.into_inner().1.maximal_sample() < u32::from(u16::MAX))
+}
+
+/// There is no decoder of PNM.
+#[cfg(not(feature = "recordings"))]
+pub(super) fn has_white_value(_: impl Read) -> bool {
+    false
 }
 
 /// Returns width and height as [`read_size`] does, from the file's contents.
