@@ -5,6 +5,7 @@
     pack.py deb FOLDER FILE             FOLDER, which has debian/control and the files below root/, as FILE (.deb)
     pack.py glibc FILE                  prints the newest GLIBC version that FILE or a program in a wheel needs
     pack.py sums FOLDER                 FOLDER/SHA256SUMS of all files in it
+    pack.py check-sums FOLDER           fails if FOLDER/SHA256SUMS has not the checksum of each file in it
 
 SOURCE_DATE_EPOCH is the time of all files.
 """
@@ -118,13 +119,24 @@ def glibc(path: Path) -> str:
     return ".".join(map(str, max(versions))) if versions else "none"
 
 
-def sums(folder: Path) -> None:
-    lines = [
+def checksums(folder: Path) -> str:
+    return "".join(
         f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.relative_to(folder).as_posix()}\n"
         for path in files(folder)
         if path.name != "SHA256SUMS"
-    ]
-    (folder / "SHA256SUMS").write_text("".join(lines))
+    )
+
+
+def sums(folder: Path) -> None:
+    (folder / "SHA256SUMS").write_text(checksums(folder))
+
+
+def check_sums(folder: Path) -> None:
+    told, found = ((folder / "SHA256SUMS").read_text(), checksums(folder))
+    differ = sorted({line.split()[1] for line in set(told.splitlines()) ^ set(found.splitlines())})
+    if differ:
+        raise SystemExit(f"pack: SHA256SUMS is not right about {', '.join(differ)}")
+    print(f"SHA256SUMS: {len(found.splitlines())} files")
 
 
 def main() -> None:
@@ -133,7 +145,8 @@ def main() -> None:
     if what == "glibc":
         print(glibc(*paths))
     else:
-        {"archive": archive, "deb": deb, "wheel": wheel, "sums": sums}[what](*paths)
+        makers = {"archive": archive, "deb": deb, "wheel": wheel, "sums": sums, "check-sums": check_sums}
+        makers[what](*paths)
 
 
 if __name__ == "__main__":

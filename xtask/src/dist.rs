@@ -1,25 +1,36 @@
 //! Makes the files of a release: the program as an archive and as a Debian package, the wheel with the library and the
 //! program, the lists of parts, and their checksums.
 
+#[cfg(test)]
+mod tests;
 mod trial;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::machine::{output, root, target};
+use crate::machine::{need_target, output, root, target};
 use crate::python;
 use crate::steps::{self, Outcome, Trouble, cargo, cargo_program};
 
 const USAGE: &str = "usage: cargo xtask dist [--target TRIPLE] [--profile NAME] [PART]...
-  without PART, all of: program, archive, deb, wheel, musl-wheel, parts, sums, try; `crates` runs only if it is named";
+  without PART, all of: program, archive, deb, wheel, musl-wheel, parts, sums, try; `crates` and `systems` run only if \
+  they are named";
 
 /// Makes a part.
 type Make = fn(&Dist) -> Outcome;
 
-/// What is made, in this order. `crates` compiles each published crate alone, which takes long.
+/// Parts that run only if they are named: they make no file. `crates` compiles each published crate alone, which takes
+/// long. `systems` checks that the command compiles for systems that this machine cannot make files for.
+const ONLY_NAMED: &[&str] = &["crates", "systems"];
+
+/// Systems that the command is checked for, with zig as compiler of the parts in C.
+const SYSTEMS: &[&str] = &["x86_64-pc-windows-gnu", "aarch64-apple-darwin"];
+
+/// What is made, in this order.
 const PARTS: &[(&str, Make)] = &[
     ("crates", Dist::check_crates),
+    ("systems", Dist::check_systems),
     ("program", Dist::build_program),
     ("archive", Dist::make_archive),
     ("deb", Dist::make_deb),
@@ -83,7 +94,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
     }
     let dist = Dist::new(triple, profile).map_err(Trouble::into_message)?;
     let selected = PARTS.iter().filter(|(name, _)| match wanted.as_slice() {
-        [] => *name != "crates",
+        [] => !ONLY_NAMED.contains(name),
         wanted => wanted.contains(name),
     });
     let mut left_out = Vec::new();
@@ -101,16 +112,17 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
     if strict && !left_out.is_empty() { Err(left_out.join("\n")) } else { Ok(()) }
 }
 
-/// Makes the files of a release for this machine and tries them. Then makes the program for the other processor, and
-/// compares its answers.
+/// Makes the files of a release for this machine and tries them. Then makes those for the other processor, and compares
+/// the answers of its program. Last, checks the command for other systems.
 pub(crate) fn try_release() -> Outcome {
-    let failed = |why| Trouble::Failed(why);
-    run(&[]).map_err(failed)?;
+    let run =
+        |args: &[&str]| run(&args.iter().map(|arg| (*arg).to_owned()).collect::<Vec<_>>()).map_err(Trouble::Failed);
+    run(&[])?;
     if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
         return Ok(());
     }
-    let other = ["--target", "aarch64-unknown-linux-musl", "program", "archive", "try"];
-    run(&other.map(str::to_owned)).map_err(failed)
+    run(&["--target", "aarch64-unknown-linux-musl"])?;
+    run(&["systems"])
 }
 
 impl Dist {
@@ -151,6 +163,11 @@ impl Dist {
     fn name(&self) -> String {
         format!("hzn-{}-{}", self.version, self.triple)
     }
+    /// Returns the path of the archive.
+    fn archive(&self) -> PathBuf {
+        let ending = if self.is_linux() { "tar.xz" } else { "zip" };
+        self.out().join(format!("{}.{ending}", self.name()))
+    }
 
     fn program(&self, triple: &str) -> PathBuf {
         let name = if triple.contains("windows") { "hzn.exe" } else { "hzn" };
@@ -186,17 +203,6 @@ impl Dist {
         steps::run(self.tool("python").arg("xtask/pack.py").arg(what).args(paths))
     }
 
-    /// Installs the standard library of a target, if it is missing.
-    fn need_target(&self, triple: &str) -> Outcome {
-        let rustup = |args: &[&str]| output(Command::new("rustup").args(args));
-        let installed = rustup(&["target", "list", "--installed"]).unwrap_or_default();
-        if triple == self.host || installed.lines().any(|line| line == triple) {
-            return Ok(());
-        }
-        let added = rustup(&["target", "add", triple]);
-        added.map(|_| ()).ok_or_else(|| Trouble::Missing(format!("needs the target: rustup target add {triple}")))
-    }
-
     /// Compiles each published crate from its package, in the order of their dependencies.
     fn check_crates(&self) -> Outcome {
         let mut publish = cargo(&["publish", "--workspace", "--dry-run"]);
@@ -204,8 +210,19 @@ impl Dist {
         steps::run(publish.arg("--target-dir").arg(self.work().join("crates")))
     }
 
+    /// Checks that the command compiles for other systems. It is not linked, because that needs their libraries.
+    fn check_systems(&self) -> Outcome {
+        for triple in SYSTEMS {
+            need_target(triple)?;
+            let mut check = self.tool("cargo-zigbuild");
+            check.args(["check", "--locked", "--package", "hzn-cli", "--target", triple]);
+            steps::run(check.arg("--target-dir").arg(self.work().join("systems")))?;
+        }
+        Ok(())
+    }
+
     fn build_program(&self) -> Outcome {
-        self.need_target(&self.triple)?;
+        need_target(&self.triple)?;
         let mut build = if self.is_linux() {
             let mut zig = self.tool("cargo-zigbuild");
             zig.arg("zigbuild");
@@ -249,8 +266,7 @@ impl Dist {
         let [bash, zsh, fish] = ["hzn.bash", "_hzn", "hzn.fish"].map(|name| shells.join(name));
         self.write_helps(&bash, &zsh, &fish, &folder.join("man"))?;
         fs::create_dir_all(self.out())?;
-        let ending = if self.is_linux() { "tar.xz" } else { "zip" };
-        self.pack("archive", &[&folder, &self.out().join(format!("{}.{ending}", self.name()))])
+        self.pack("archive", &[&folder, &self.archive()])
     }
 
     /// Returns Debian's name of the processor.
@@ -318,7 +334,7 @@ impl Dist {
     fn make_wheel_for(&self, triple: &str, standard: &str) -> Outcome {
         let program = self.built()?;
         let wheels = fresh(&self.wheels(standard))?;
-        self.need_target(triple)?;
+        need_target(triple)?;
         let mut maturin = self.tool("python");
         maturin.args(["-m", "maturin", "build", "--locked", "--profile", &self.profile, "--target", triple]);
         maturin.args(["--manifest-path", "crates/hzn-py/Cargo.toml", "--out"]).arg(&wheels);
@@ -338,15 +354,23 @@ impl Dist {
     fn list_parts(&self) -> Outcome {
         let sbom = ["run", "--quiet", "--package", "hzn-supply", "--"];
         let lists = fresh(&self.work().join("sbom"))?;
-        steps::run(cargo(&sbom).arg(&lists))?;
+        // Each system has parts of its own.
+        steps::run(cargo(&sbom).arg(&lists).arg(&self.triple))?;
         for product in ["hzn-cli", "hzn-py"] {
-            let list = format!("{product}.cdx.json");
-            copy(&lists.join(&list), &self.out().join(list))?;
+            let name = format!("{product}-{}-{}.cdx.json", self.version, self.triple);
+            copy(&lists.join(format!("{product}.cdx.json")), &self.out().join(name))?;
         }
         Ok(())
     }
 
+    /// Writes the checksums of all files of this version. Files of other versions are removed.
     fn write_sums(&self) -> Outcome {
+        for path in fs::read_dir(self.out())?.flatten().map(|entry| entry.path()) {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            if path.is_file() && name != "SHA256SUMS" && !name.contains(&self.version) {
+                fs::remove_file(&path)?;
+            }
+        }
         self.pack("sums", &[&self.out()])
     }
 }

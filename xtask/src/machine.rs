@@ -28,6 +28,18 @@ pub(crate) fn output(command: &mut Command) -> Option<String> {
     out.status.success().then(|| String::from_utf8_lossy(&out.stdout).trim().to_owned())
 }
 
+/// Installs the standard library of a target, if it is missing.
+pub(crate) fn need_target(triple: &str) -> Outcome {
+    let library = || output(Command::new("rustc").args(["--print", "target-libdir", "--target", triple]));
+    let is_there = || library().is_some_and(|path| Path::new(&path).exists());
+    if is_there() {
+        return Ok(());
+    }
+    let _ = run(Command::new("rustup").args(["target", "add", triple]));
+    let missing = || Trouble::Missing(format!("needs the standard library of a target: rustup target add {triple}"));
+    is_there().then_some(()).ok_or_else(missing)
+}
+
 /// Installs the missing Debian packages. Fails if apt-get is missing, the user is not root, or the installation fails.
 pub(crate) fn apt_install(packages: &[&str]) -> Outcome {
     let installed = |p: &&str| {

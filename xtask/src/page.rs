@@ -1,10 +1,10 @@
 //! The page with the sensor in the browser (crates/hzn-web): its files, and its test in a browser.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
-use crate::machine::{has, output, root, target};
+use crate::machine::{apt_install, has, need_target, root, target};
 use crate::site;
 use crate::steps::{self, Outcome, Trouble, cargo};
 use crate::test_build::build_tests;
@@ -21,12 +21,7 @@ fn folder() -> PathBuf {
 
 /// Builds the page into target/xtask/page.
 pub(crate) fn build() -> Result<PathBuf, Trouble> {
-    let library = output(Command::new("rustc").args(["--print", "target-libdir", "--target", TRIPLE]));
-    if !library.is_some_and(|path| Path::new(path.trim()).exists()) {
-        return Err(Trouble::Missing(format!(
-            "needs the standard library for the browser: rustup target add {TRIPLE}"
-        )));
-    }
+    need_target(TRIPLE)?;
     // `--crate-type` is only given here, so that other builds link no library.
     let mut build = cargo(&["rustc", "--package", "hzn-web", "--lib", "--crate-type", "cdylib"]);
     steps::run(build.args(["--profile", "web", "--target", TRIPLE]))?;
@@ -60,12 +55,18 @@ pub(crate) fn run() -> Result<(), String> {
     Ok(())
 }
 
+/// Returns the name of a browser, which is installed if there is none.
+fn browser() -> Result<&'static str, Trouble> {
+    let found = || ["chromium", "chromium-browser", "google-chrome"].into_iter().find(|name| has(name));
+    if found().is_none() {
+        apt_install(&["chromium"])?;
+    }
+    found().ok_or_else(|| Trouble::Missing("needs the browser Chromium: apt-get install chromium".into()))
+}
+
 /// Tests the page in a browser without a window and without a network: its answers are those of `hzn run`.
 pub(crate) fn test() -> Outcome {
-    let browsers = ["chromium", "chromium-browser", "google-chrome"];
-    let Some(browser) = browsers.into_iter().find(|name| has(name)) else {
-        return Err(Trouble::Missing("needs the browser Chromium: apt-get install chromium".into()));
-    };
+    let browser = browser()?;
     let page = build()?;
     build_tests()?;
     let mut check = Command::new("python3");

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 pub const PRODUCTS: &[&str] = &["hzn-cli", "hzn-py", "hzn-mps2"];
 
 /// Packages for other systems are left out, because cargo would have to fetch them.
-const PLATFORM: &str = "x86_64-unknown-linux-gnu";
+pub const PLATFORM: &str = "x86_64-unknown-linux-gnu";
 
 /// A package of the dependency graph.
 #[derive(Debug, Clone, Deserialize)]
@@ -74,9 +74,9 @@ pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-fn metadata(manifest: &str) -> Metadata {
+fn metadata(manifest: &str, platform: &str) -> Metadata {
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    cargo.args(["metadata", "--locked", "--format-version", "1", "--filter-platform", PLATFORM, "--manifest-path"]);
+    cargo.args(["metadata", "--locked", "--format-version", "1", "--filter-platform", platform, "--manifest-path"]);
     cargo.arg(root().join(manifest));
     let out = cargo.output().expect("cargo runs");
     assert!(out.status.success(), "{manifest}: {}", String::from_utf8_lossy(&out.stderr));
@@ -88,16 +88,17 @@ fn metadata(manifest: &str) -> Metadata {
 /// # Panics
 /// Cargo cannot read the manifest and its lock file.
 pub fn packages(manifest: &str) -> Vec<Package> {
-    metadata(manifest).packages
+    metadata(manifest, PLATFORM).packages
 }
 
-/// Returns the CycloneDX list of the parts that are linked into a product. Dependencies for builds and tests are left
-/// out. The list depends only on the lock file, so the same commit gives the same list.
+/// Returns the CycloneDX list of the parts that are linked into a product for a platform, which is a triple of rustc.
+/// Dependencies for builds and tests are left out. The list depends only on the lock file, so the same commit gives the
+/// same list.
 ///
 /// # Panics
 /// The package does not exist, or cargo cannot read the manifest and its lock file.
-pub fn sbom(package: &str) -> Value {
-    let Metadata { packages, resolve } = metadata("Cargo.toml");
+pub fn sbom(package: &str, platform: &str) -> Value {
+    let Metadata { packages, resolve } = metadata("Cargo.toml", platform);
     let lock = std::fs::read_to_string(root().join("Cargo.lock")).expect("a lock file");
     let lock: Lock = toml::from_str(&lock).expect("a valid lock file");
     let checksums: BTreeMap<(&str, &str), &str> = lock

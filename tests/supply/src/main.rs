@@ -1,16 +1,18 @@
-//! Writes the CycloneDX list of parts (SBOM) of the command, the wheel and the firmware into a folder.
+//! Writes the CycloneDX list of parts (SBOM) of the command, the wheel and the firmware into a folder. PLATFORM is the
+//! triple of the system whose parts are listed.
 //!
-//! `cargo run -p hzn-supply -- FOLDER`
+//! `cargo run -p hzn-supply -- FOLDER [PLATFORM]`
 
 use std::path::PathBuf;
 
-use hzn_supply::{PRODUCTS, sbom};
+use hzn_supply::{PLATFORM, PRODUCTS, sbom};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let folder = PathBuf::from(std::env::args().nth(1).ok_or("usage: sbom FOLDER")?);
+    let folder = PathBuf::from(std::env::args().nth(1).ok_or("usage: sbom FOLDER [PLATFORM]")?);
+    let platform = std::env::args().nth(2).unwrap_or_else(|| PLATFORM.to_owned());
     std::fs::create_dir_all(&folder)?;
     for package in PRODUCTS {
-        let list = sbom(package);
+        let list = sbom(package, &platform);
         let path = folder.join(format!("{package}.cdx.json"));
         std::fs::write(&path, serde_json::to_string_pretty(&list)? + "\n")?;
         println!("{}: {} parts", path.display(), list["components"].as_array().map_or(0, Vec::len));

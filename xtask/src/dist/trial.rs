@@ -14,7 +14,14 @@ use crate::steps::{self, Outcome, Trouble, processor_seconds};
 const MINORS: std::ops::RangeInclusive<u32> = 10..=14;
 /// Most processor time from a file to its first answer, s. Wall time would depend on what else the machine does.
 const LIMIT_S: f64 = 60.0;
-const IMPORT: &str = "import hzn; print(hzn.simulate('rocket-clean', frames=2)[1].image.shape, hzn.__version__)";
+/// Uses the library, and reads the licences: a link that was packed as a file has only a few bytes.
+const IMPORT: &str = "\
+import hzn, importlib.metadata
+print(hzn.simulate('rocket-clean', frames=2)[1].image.shape, hzn.__version__)
+texts = [file.read_text() for file in importlib.metadata.files('hzn-sensor') if 'LICENSE' in file.name]
+assert len(texts) >= 2 and min(map(len, texts)) > 1000, [len(text) for text in texts]";
+/// The licences of a package have at least this many bytes.
+const LICENCE_BYTES: u64 = 1000;
 
 impl Dist {
     /// Runs the archive in an empty root folder, looks into the Debian package, and runs the wheel. A program for
@@ -22,15 +29,22 @@ impl Dist {
     pub(super) fn try_files(&self) -> Outcome {
         if !self.is_linux() {
             self.need_own_processor()?;
-            let empty = fresh(&self.work().join("empty"))?;
-            return steps::run(Command::new(self.built()?).arg("demo").current_dir(&empty))
-                .and_then(|()| self.try_wheel());
-        }
-        let flight = self.try_archive()?;
-        if self.has_own_processor() {
-            self.try_deb()?;
+            let unpacked = fresh(&self.work().join("empty"))?;
+            steps::run(self.tool("python").args(["-m", "zipfile", "-e"]).arg(self.archive()).arg(&unpacked))?;
+            let alone = unpacked.join(self.name());
+            let program = alone.join(self.built()?.file_name().unwrap_or_default());
+            make_executable(&program)?;
+            timed("the archive", LIMIT_S, || steps::run(Command::new(&program).arg("demo").current_dir(&alone)))?;
             return self.try_wheel();
         }
+        self.check_sums()?;
+        let flight = self.try_archive()?;
+        self.try_deb()?;
+        if self.has_own_processor() {
+            self.try_wheel()?;
+            return self.try_musl_wheel();
+        }
+        self.try_musl_wheel()?;
         let ours = fresh(&self.work().join("ours"))?;
         steps::run(Command::new(self.own_program()?).arg("demo").current_dir(&ours))?;
         let mut compare = self.tool("python");
@@ -49,29 +63,52 @@ impl Dist {
         self.has_own_processor().then_some(()).ok_or_else(why)
     }
 
+    /// Compares the checksums with the files, if they are written already.
+    fn check_sums(&self) -> Outcome {
+        let sums = self.out().join("SHA256SUMS");
+        if sums.is_file() { self.pack("check-sums", &[&self.out()]) } else { Ok(()) }
+    }
+
     /// Unpacks the archive, and runs its program where nothing else is. Returns the table that it writes.
     fn try_archive(&self) -> Result<PathBuf, Trouble> {
-        let archive = self.out().join(format!("{}.tar.xz", self.name()));
+        let archive = self.archive();
         if !archive.is_file() {
             return Err(Trouble::Missing(format!("needs: cargo xtask dist --target {} archive", self.triple)));
         }
         let unpacked = fresh(&self.work().join("empty").join(&self.triple))?;
         steps::run(self.tool("python").args(["-m", "tarfile", "-e"]).arg(&archive).arg(&unpacked))?;
         let alone = unpacked.join(self.name());
+        for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
+            need_text(&alone.join(licence))?;
+        }
+        let mut run = self.command_alone(&alone)?;
+        let (how, limit_s) = if self.has_own_processor() { ("", LIMIT_S) } else { (", emulated", f64::INFINITY) };
+        let what = format!("the archive, in an empty root folder{how}");
+        timed(&what, limit_s, || steps::run(run.arg("demo")))?;
+        Ok(alone.join("hzn-demo/flight.csv"))
+    }
+
+    /// Returns a call of the program `hzn` in a folder that becomes the root folder, so that the program finds nothing
+    /// else. Only root can do this; for others the folder is the working directory.
+    fn command_alone(&self, alone: &Path) -> Result<Command, Trouble> {
         let emulator = if self.has_own_processor() { None } else { Some(self.emulator()?) };
         let is_root = output(Command::new("id").arg("-u")).is_some_and(|id| id == "0");
         // The folder has nothing that PATH could name: PATH is only for chroot itself.
         let path = std::env::var_os("PATH").unwrap_or_default();
-        let mut run = match (&emulator, is_root && has("chroot")) {
+        let can_change_root = is_root && has("chroot");
+        if !can_change_root {
+            println!("not in an empty root folder: that needs root and chroot");
+        }
+        let mut run = match (&emulator, can_change_root) {
             (Some(emulator), true) => {
                 copy(emulator, &alone.join("emulator"))?;
                 let mut run = Command::new("chroot");
-                run.arg(&alone).args(["/emulator", "/hzn"]);
+                run.arg(alone).args(["/emulator", "/hzn"]);
                 run
             }
             (None, true) => {
                 let mut run = Command::new("chroot");
-                run.arg(&alone).arg("/hzn");
+                run.arg(alone).arg("/hzn");
                 run
             }
             (Some(emulator), false) => {
@@ -81,14 +118,8 @@ impl Dist {
             }
             (None, false) => Command::new(alone.join("hzn")),
         };
-        run.arg("demo").current_dir(&alone).env_clear().env("PATH", path);
-        let first = || steps::run(&mut run);
-        if emulator.is_none() {
-            timed("the archive, in an empty root folder", first)?
-        } else {
-            steps::run(&mut run)?
-        }
-        Ok(alone.join("hzn-demo/flight.csv"))
+        run.current_dir(alone).env_clear().env("PATH", path);
+        Ok(run)
     }
 
     /// Returns the program that runs programs of the other processor. It is static, so it runs in an empty folder, too.
@@ -119,26 +150,42 @@ impl Dist {
             "usr/share/man/man1/hzn.1.gz",
             "usr/share/man/man1/hzn-run.1.gz",
             "usr/share/bash-completion/completions/hzn",
-            "usr/share/doc/hzn/copyright",
+            "usr/share/zsh/vendor-completions/_hzn",
+            "usr/share/fish/vendor_completions.d/hzn.fish",
         ] {
             if !unpacked.join(part).is_file() {
                 return Err(Trouble::Failed(format!("{} is without {part}", package.display())));
             }
         }
-        steps::run(Command::new(unpacked.join("usr/bin/hzn")).arg("--version"))
+        need_text(&unpacked.join("usr/share/doc/hzn/copyright"))?;
+        steps::run(self.command_alone(&unpacked.join("usr/bin"))?.arg("--version"))
+    }
+
+    /// Runs the program of the wheel for musl. Its library needs an interpreter that was built for musl, which the
+    /// workflow `release` has.
+    fn try_musl_wheel(&self) -> Outcome {
+        let wheel = only_file(&self.wheels("musllinux_1_2"))
+            .map_err(|_| Trouble::Missing("needs: cargo xtask dist musl-wheel".into()))?;
+        self.check_glibc(&wheel)?;
+        let unpacked = fresh(&self.work().join("unpacked-wheel"))?;
+        steps::run(self.tool("python").args(["-m", "zipfile", "-e"]).arg(&wheel).arg(&unpacked))?;
+        let scripts = unpacked.join(format!("hzn_sensor-{}.data/scripts", self.version));
+        make_executable(&scripts.join("hzn"))?;
+        steps::run(self.command_alone(&scripts)?.arg("--version"))
     }
 
     fn try_wheel(&self) -> Outcome {
         let wheel = only_file(&self.wheels("manylinux2014"))
             .map_err(|_| Trouble::Missing("needs: cargo xtask dist wheel".into()))?;
         self.check_glibc(&wheel)?;
+        self.try_from_empty_home(&wheel)?;
         let found = interpreters();
         for (minor, python) in &found {
             let environment = fresh(&self.work().join("venv"))?;
             steps::run(Command::new(python).args(["-m", "venv"]).arg(&environment))?;
             let bin = environment.join(if cfg!(windows) { "Scripts" } else { "bin" });
             let away = fresh(&self.work().join("away"))?;
-            timed(&format!("the wheel, in a new environment of Python 3.{minor}"), || {
+            timed(&format!("the wheel, in a new environment of Python 3.{minor}"), LIMIT_S, || {
                 let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
                 steps::run(Command::new(bin.join("python")).args(pip).arg(&wheel))?;
                 steps::run(Command::new(bin.join("hzn")).arg("demo").current_dir(&away))
@@ -148,6 +195,17 @@ impl Dist {
         let missing = MINORS.filter(|minor| !found.iter().any(|(have, _)| have == minor));
         missing.for_each(|minor| println!("Python 3.{minor}: not run here; the workflow `release` runs it"));
         if found.is_empty() { Err(Trouble::Missing("needs Python 3.10 or later".into())) } else { Ok(()) }
+    }
+
+    /// Runs the wheel as someone does who has only uv, and has never used it: every folder that it could know is empty.
+    fn try_from_empty_home(&self, wheel: &Path) -> Outcome {
+        let home = fresh(&self.work().join("home"))?;
+        let mut run = self.tool("uv");
+        run.args(["tool", "run", "--from"]).arg(wheel).args(["hzn", "demo"]).current_dir(&home).env("HOME", &home);
+        for name in ["XDG_CACHE_HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "UV_CACHE_DIR", "UV_TOOL_DIR"] {
+            run.env(name, home.join(name));
+        }
+        timed("the wheel, by uv from an empty home folder", LIMIT_S, || steps::run(&mut run))
     }
 
     /// Fails if a wheel needs a newer glibc than that of manylinux2014, or if one for musl needs any.
@@ -166,15 +224,32 @@ impl Dist {
     }
 }
 
-/// Runs the way to a first answer, prints its time, and fails if it takes too long.
-fn timed(what: &str, run: impl FnOnce() -> Outcome) -> Outcome {
+/// Fails if a file has no text of the length of a licence.
+fn need_text(path: &Path) -> Outcome {
+    let bytes = fs::metadata(path).map_or(0, |about| about.len());
+    let short = || Trouble::Failed(format!("{}: {bytes} bytes are no licence", path.display()));
+    (bytes > LICENCE_BYTES).then_some(()).ok_or_else(short)
+}
+
+/// Lets a file be executed: `zipfile` of Python unpacks without the permissions.
+fn make_executable(_path: &Path) -> Outcome {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        fs::set_permissions(_path, fs::Permissions::from_mode(0o755))?;
+    }
+    Ok(())
+}
+
+/// Runs the way to a first answer, prints its time, and fails if it takes more than the limit.
+fn timed(what: &str, limit_s: f64, run: impl FnOnce() -> Outcome) -> Outcome {
     let (began, used) = (Instant::now(), processor_seconds());
     run()?;
     let took_s = processor_seconds().zip(used).map(|(now, then)| now - then);
     let wall_s = began.elapsed().as_secs_f64();
     println!("{what}: first answer after {wall_s:.1} s, {:.1} s of processors", took_s.unwrap_or(f64::NAN));
-    if took_s.unwrap_or(wall_s) > LIMIT_S {
-        return Err(Trouble::Failed(format!("{what}: the first answer takes longer than {LIMIT_S} s")));
+    if took_s.unwrap_or(wall_s) > limit_s {
+        return Err(Trouble::Failed(format!("{what}: the first answer takes longer than {limit_s} s")));
     }
     Ok(())
 }

@@ -40,7 +40,7 @@ fn licences_and_sources_are_allowed() {
 #[test]
 fn the_list_of_parts_is_complete() {
     for package in supply::PRODUCTS {
-        let sbom = supply::sbom(package);
+        let sbom = supply::sbom(package, supply::PLATFORM);
         assert_eq!((&sbom["bomFormat"], &sbom["specVersion"]), (&"CycloneDX".into(), &"1.5".into()));
         assert_eq!(sbom["metadata"]["component"]["name"], *package);
         let parts = sbom["components"].as_array().unwrap();
@@ -51,6 +51,22 @@ fn the_list_of_parts_is_complete() {
             assert!(is_ours || part["hashes"][0]["alg"] == "SHA-256", "{part} has no checksum");
         }
     }
+}
+
+/// The page in the browser has no C compiler, no files and no threads, so nothing that it is built from may need them.
+#[test]
+fn the_page_is_built_without_c() {
+    let tree = |platform: &[&str]| {
+        let mut cargo = std::process::Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+        cargo.args(["tree", "--locked", "--edges", "normal,build", "--prefix", "none", "--package"]).args(platform);
+        let out = cargo.current_dir(supply::root()).output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        String::from_utf8(out.stdout).unwrap()
+    };
+    let needs_c = |tree: &str| tree.lines().any(|part| part.starts_with("zstd-sys ") || part.starts_with("cc "));
+    let page = tree(&["hzn-web", "--target", "wasm32-unknown-unknown"]);
+    assert!(page.contains("hzn-run ") && !needs_c(&page), "{page}");
+    assert!(needs_c(&tree(&["hzn-cli"])), "the command has zstd; otherwise the lines above look for another name");
 }
 
 /// A dependency that nothing uses would be kept up to date for nothing.
