@@ -2,8 +2,8 @@
 
     python3 check_page.py --page FOLDER --hzn PROGRAM --browser chromium --out FOLDER
 
-Each example must have the row of `hzn run`, to the last bit but for the times. The page must answer soon after it is
-opened, be small, ask for nothing but its own files, and work on when the network is gone. Pictures of the page go into
+Each example must have the row of `hzn run`, to the last bit but for the times, and the text of `hzn explain`, and the
+picture must show the limb and its points. The page must answer soon after it is opened, be small, ask for nothing but its own files, and work on when the network is gone. Pictures of the page go into
 the folder `--out`, to be looked at.
 """
 
@@ -15,6 +15,7 @@ import http.server
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import tempfile
@@ -23,6 +24,7 @@ import time
 
 MAX_SECONDS = 10  # the goal is 2 s on an idle machine
 MAX_GZIP_BYTES = 1_000_000
+MIN_DRAWN_PIXELS = 20  # of one pure colour, which no photograph has; dots of a small picture have soft edges
 SIZES = {"wide": (1440, 900, False), "phone": (390, 844, True)}
 
 
@@ -129,6 +131,18 @@ def rows_of_run(hzn, page, example, scratch, toml=None):
     return [plain(json.loads(line)) for line in out.read_text().splitlines()]
 
 
+def explanation(hzn, scratch, example):
+    """The text of `hzn explain` without the block of times."""
+    folder = scratch / example["file"]
+    explain = [hzn, "explain", folder / example["file"], "--sensor", folder / "sensor.toml"]
+    lines, in_times = [], False
+    for line in subprocess.run(explain, check=True, capture_output=True, text=True).stdout.splitlines():
+        in_times = line.startswith("time ") or (in_times and line.startswith(" "))
+        if not in_times:
+            lines.append(line)
+    return lines
+
+
 def plain(row):
     """A row without what a browser does not have: times, and the checksum of the line that has them."""
     return {name: value for name, value in row.items() if name not in ("elapsed_us", "crc32")}
@@ -139,10 +153,40 @@ def shown_rows(browser):
 
 
 def open_page(browser, url, example):
+    """Opens the page. Returns the time from its opening to the answer, in ms."""
     browser.call("Page.navigate", url="about:blank")
     browser.call("Page.navigate", url=url + "#" + example["file"])
     browser.wait("document.getElementById('row')?.textContent.length > 0")
-    return int(browser.value("document.getElementById('time').textContent").split(" ms after")[0].split()[-1])
+    return shown_times_ms(browser)[1]
+
+
+def process_again(browser):
+    """Processes the picture once more, when the module is there. Returns the time that it takes, in ms."""
+    browser.value("document.getElementById('row').textContent = ''; document.getElementById('process').click()")
+    browser.wait("document.getElementById('row').textContent.length > 0")
+    return shown_times_ms(browser)[0]
+
+
+def shown_times_ms(browser):
+    """Returns the times that the page shows: of the picture, and since the page was opened."""
+    text = browser.value("document.getElementById('time').textContent")
+    return [int(ms) for ms in re.findall(r"(\d+) ms", text)]
+
+
+def pixels(browser, colour):
+    """How many pixels of the drawn picture have exactly this colour of the page."""
+    return browser.value(f"""(() => {{
+        const text = getComputedStyle(document.documentElement).getPropertyValue("--{colour}").trim();
+        const [r, g, b] = [1, 3, 5].map((i) => parseInt(text.slice(i, i + 2), 16));
+        const shown = document.getElementById("canvas");
+        const copy = Object.assign(document.createElement("canvas"), {{ width: shown.width, height: shown.height }});
+        const pen = copy.getContext("2d", {{ willReadFrequently: true }});
+        pen.drawImage(shown, 0, 0);
+        const {{ data }} = pen.getImageData(0, 0, copy.width, copy.height);
+        let n = 0;
+        for (let i = 0; i < data.length; i += 4) n += data[i] === r && data[i + 1] === g && data[i + 2] === b;
+        return n;
+    }})()""")
 
 
 def check_examples(browser, arguments, url, scratch):
@@ -156,7 +200,13 @@ def check_examples(browser, arguments, url, scratch):
         assert ours[0]["status"] == "ok", (example["file"], ours[0]["status"])
         numbers = sum(isinstance(value, float) for value in ours[0].values())
         assert numbers > 20, numbers
-        print(f"{example['file']}: {numbers} numbers equal those of hzn run; {ms} ms after opening")
+        told = browser.value("document.getElementById('explained').textContent").splitlines()
+        expected = explanation(arguments.hzn, scratch, example)
+        assert told == expected and len(told) > 10, (example["file"], set(told) ^ set(expected))
+        drawn = {colour: pixels(browser, colour) for colour in ("limb", "inlier")}
+        assert min(drawn.values()) > MIN_DRAWN_PIXELS, (example["file"], drawn)
+        own_ms = process_again(browser)
+        print(f"{example['file']}: {numbers} numbers equal those of hzn run; {ms} ms after opening, then {own_ms} ms")
         assert ms < 1e3 * MAX_SECONDS, f"the answer came {ms} ms after the page was opened"
         for name, (width, height, phone) in SIZES.items():
             browser.screenshot(arguments.out / f"{pathlib.Path(example['file']).stem}-{name}.png", width, height, phone)
@@ -192,8 +242,21 @@ def check_without_network(browser, arguments, url, asked, example, scratch):
     browser.value("document.getElementById('process').click()")
     why = browser.wait("document.querySelector('#status.bad')?.textContent")
     assert "widht" in why and "width" in why, why
+    # A picture that is dropped, with another lens.
+    browser.value("document.getElementById('lens').value = 'fisheye'; document.getElementById('row').textContent = ''")
+    data = base64.b64encode(picture.read_bytes()).decode()
+    browser.value(f"""(() => {{
+        const bytes = Uint8Array.from(atob("{data}"), (c) => c.charCodeAt(0));
+        const dataTransfer = new DataTransfer();
+        dataTransfer.items.add(new File([bytes], "{example["file"]}"));
+        document.dispatchEvent(new DragEvent("drop", {{ dataTransfer, bubbles: true, cancelable: true }}));
+    }})()""")
+    browser.wait("document.getElementById('row').textContent.length > 0")
+    other = browser.value("document.getElementById('toml').value")
+    assert other != toml and 'model = "kannala-brandt"' in other, other
+    assert shown_rows(browser) == rows_of_run(arguments.hzn, arguments.page, example, scratch, other)
     assert asked[before:] == [], asked[before:]
-    print("without a network: own picture, slider and errors work; nothing was asked for")
+    print("without a network: chosen and dropped pictures, slider and errors work; nothing was asked for")
 
 
 def main():
