@@ -13,7 +13,7 @@ use crate::dist::{self, exclude_unpublished};
 use crate::machine::{apt_install, has, root, target};
 use crate::steps::{self, Outcome, Selection, Step, Steps, Tier, cargo};
 use crate::test_build::build_tests;
-use crate::{campaign, firmware, miri, page, python, viewer, wheel};
+use crate::{campaign, firmware, first_command, miri, page, python, viewer, wheel};
 
 const fn every(name: &'static str, run: fn(&mut Steps) -> Outcome) -> Step {
     Step { name, tier: Tier::Every, run }
@@ -38,9 +38,11 @@ const STEPS: &[Step] = &[
     every("tests", test_workspace),
     every("tests of hzn-core alone", test_core_alone),
     every("undefined behaviour", |steps| miri::test(steps.all)),
-    every("feature sets of hzn-core", |_| {
+    every("feature sets", |_| {
         // The tests above build it without features. A feature chooses by `cfg!`, so most code is always compiled.
-        ["std,_edges", "serde", "dlr,zju,horace,erf,kalibr,position,reml"].into_iter().try_for_each(check_core_with)
+        ["std,_edges", "serde", "dlr,zju,horace,erf,kalibr,position,reml"].into_iter().try_for_each(check_core_with)?;
+        // The crates of the page, without files and threads: the workspace builds them with all features.
+        steps::run(&mut cargo(&["check", "--quiet", "--package", "hzn-web"]))
     }),
     every("documents", |_| steps::run(cargo(&["doc", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))),
     every("packages", |_| check_packages()),
@@ -63,6 +65,7 @@ const STEPS: &[Step] = &[
     long("Basilisk and Rerun", |_| wheel::try_other_tools()),
     long("page in the browser", |_| page::test()),
     long("files of a release", |_| dist::try_release()),
+    long("first command", |_| first_command::test()),
     long("ignored tests", run_ignored_tests),
     long("killed runs", |_| campaign::kill(1000)),
     long("flipped bits", |_| campaign::flips(20_000)),
