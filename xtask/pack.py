@@ -135,7 +135,7 @@ def check_sums(folder: Path) -> None:
     told, found = ((folder / "SHA256SUMS").read_text(), checksums(folder))
     differ = sorted({line.split()[1] for line in set(told.splitlines()) ^ set(found.splitlines())})
     if differ:
-        raise SystemExit(f"pack: SHA256SUMS is not right about {', '.join(differ)}")
+        raise SystemExit(f"pack: SHA256SUMS is wrong about {', '.join(differ)}; `cargo xtask dist sums` writes it again")
     print(f"SHA256SUMS: {len(found.splitlines())} files")
 
 

@@ -67,9 +67,9 @@ pub(super) fn read_file_holding(path: &Path, held: &mut Held) -> Result<Vec<u8>,
     if bytes.is_empty() { Err("file is empty".into()) } else { Ok(bytes) }
 }
 
-/// Decodes PNG, JPEG, one plane of FITS, or an array of NumPy, and with the feature `recordings` TIFF, PNM, BMP and WebP.
-/// Palettes become colour, and CMYK becomes RGB. If a file contains several pictures, the first is decoded. `expected` is the
-/// camera's size in pixels: a picture of another size is refused before anything large is decoded.
+/// Decodes PNG, JPEG, one plane of FITS, or an array of NumPy, and with the feature `recordings` TIFF, PNM, BMP and
+/// WebP. Palettes become colour, and CMYK becomes RGB. If a file contains several pictures, the first is decoded.
+/// `expected` is the camera's size in pixels: a picture of another size is refused before anything large is decoded.
 ///
 /// # Errors
 /// The reason why it cannot be decoded, for the picture's result.
