@@ -8,6 +8,7 @@ Orekit reads the AEM too, but not without its own data (the history of UTC - TAI
 import csv
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import brahe as bh
@@ -41,22 +42,42 @@ def fuse(hzn: str, folder: Path, output: str, *more: str) -> None:
     subprocess.run(command, check=True, capture_output=True)
 
 
+Attitude = Callable[[float], np.ndarray]
+
+
+def check_truth(name: str, attitude_at: Attitude, folder: Path, rows: list[dict[str, str]]) -> None:
+    """Compare an attitude as a library gives it with the truth of the flight: each error, and NEES."""
+    with (folder / "vehicle.csv").open() as file:
+        vehicle = list(csv.DictReader(file))
+    sigmas, nees = brahe_aem.misses(attitude_at, vehicle, rows)
+    assert len(nees) > 100, len(nees)
+    assert np.abs(sigmas).max() < 3, np.abs(sigmas).max()
+    # Rows that follow each other have nearly the same error, so their mean is as uncertain as a few draws. The bounds are
+    # the 1 % and 99 % points of one draw: chi-square with three degrees of freedom.
+    assert 0.11 < np.mean(nees) < 11.3, np.mean(nees)
+    print(f"{name}: {len(nees)} attitudes against the truth; NEES (3 degrees of freedom) {np.mean(nees):.2f}; errors "
+          f"at most {np.abs(sigmas).max():.2f} sigmas")
+
+
 def check_ck(folder: Path, rows: list[dict[str, str]]) -> None:
-    """Compare the CK with the CSV, as SPICE reads it."""
+    """Compare the CK with the CSV and with the truth, as SPICE reads it."""
     for kind in ("tsc", "tf", "bc"):
         spice.furnsh(str(folder / f"nav.{kind}"))
     assert list(spice.ckobj(str(folder / "nav.bc"))) == [1000 * SPACECRAFT]
     assert spice.frmnam(1000 * SPACECRAFT) == "HZN_BODY"
     begin = float(rows[0]["time_s"])
+
+    def attitude_at(time_s: float) -> np.ndarray:
+        # SPICE's matrix turns vectors from ITRF93 into the frame of the vehicle.
+        return spice.ckgp(1000 * SPACECRAFT, round((time_s - begin) * 1e6), 0.0, "ITRF93")[0].T
+
     worst = 0.0
     for row in rows:
-        ticks = round((float(row["time_s"]) - begin) * 1e6)
-        matrix, _ = spice.ckgp(1000 * SPACECRAFT, ticks, 0.0, "ITRF93")
-        # SPICE's matrix turns vectors from ITRF93 into the frame of the vehicle.
         fixed_from_vehicle = rotation(*(float(row[name]) for name in ("qw", "qx", "qy", "qz")))
-        worst = max(worst, np.abs(matrix - fixed_from_vehicle.T).max())
+        worst = max(worst, np.abs(attitude_at(float(row["time_s"])) - fixed_from_vehicle).max())
     assert worst < 1e-8, worst
     print(f"CK: {len(rows)} attitudes, differences below {worst:.1e}")
+    check_truth("CK in SPICE", attitude_at, folder, rows)
 
 
 def check_aem(folder: Path, rows: list[dict[str, str]]) -> None:
@@ -93,13 +114,7 @@ def check_brahe(folder: Path, rows: list[dict[str, str]]) -> None:
     whole, part = angle_deg(truth[i], truth[i + 1]), angle_deg(truth[i], between)
     assert whole > 0.01, whole
     assert abs(part - whole / 2) < 0.01 * whole, (part, whole)
-    # The error of the attitude is within three sigmas, about each axis.
-    with (folder / "vehicle.csv").open() as file:
-        vehicle = list(csv.DictReader(file))
-    misses = brahe_aem.misses(attitude, start, vehicle, rows)
-    assert len(misses) > 100, len(misses)
-    assert np.mean(np.abs(misses) < 3) > 0.97, np.abs(misses).max()
-    print(f"AEM in brahe: {len(rows)} attitudes; {len(misses)} errors, at most {np.abs(misses).max():.2f} sigmas")
+    check_truth("AEM in brahe", lambda t: brahe_aem.fixed_from_vehicle(attitude, start + t), folder, rows)
 
 
 def angle_deg(a: np.ndarray, b: np.ndarray) -> float:

@@ -1,4 +1,5 @@
 """Writes bags with other libraries, processes them with hzn, and reads the answers of hzn with these libraries.
+The programs in book/guide/ros.md run as they are printed there, over a flight whose truth is known.
 
 usage: check_ros.py HZN FOLDER
 
@@ -7,9 +8,11 @@ bag in SQLite; `mcap-ros2-support` writes a recording of sensor_msgs/CompressedI
 the grey picture. Both libraries then read what `hzn run --ros` has written. Exits with 1 at the first difference.
 """
 
+import contextlib
 import csv
 import io
 import math
+import re
 import struct
 import subprocess
 import sys
@@ -20,7 +23,7 @@ import numpy as np
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer as Mcap
 from mcap.reader import make_reader
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 W, H, F = 320, 240, 300.0
@@ -42,6 +45,9 @@ limb = "height"
 fixed_edge = "off"
 """
 IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+# The centre of the body of `limb()`.
+TRUTH = np.array([0.0, math.sin(math.radians(68.0)), math.cos(math.radians(68.0))])
+BOOK = Path(__file__).parents[2] / "book/guide/ros.md"
 # A number of seconds in double precision cannot hold these nanoseconds.
 BASE_NS = 1_700_000_000_000_000_487
 
@@ -137,6 +143,9 @@ def check_encodings(folder, store):
         # A mosaic becomes a little softer; everything else has the same counts but for their rounding.
         off = angle_deg(axis(row), axis(first))
         need(off < (0.02 if "bayer" in encoding else 0.002), f"{encoding}: {off} degrees from the grey picture")
+        # The picture has no noise, and all rows are of one picture, so there is no NEES.
+        error, sigma = angle_deg(axis(row), TRUTH), float(row["sigma_max_deg"])
+        need(error < 3 * sigma, f"{encoding}: the error of {error} degrees is above three sigmas of {sigma} degrees")
     return answers, rows
 
 
@@ -172,6 +181,45 @@ def check_bytes_of_rosbags(answers, store, rows):
             vector = store.deserialize_cdr(message.data, "geometry_msgs/msg/Vector3Stamped").vector
             need(np.array_equal([vector.x, vector.y, vector.z], axis(rows[0])), "axis, read by rosbags")
             return
+
+
+def check_flight(folder, store):
+    """Runs the programs of the book over a simulated flight, and compares the messages of ROS with the truth."""
+    flight = folder / "flight"
+    hzn("simulate", "leo-infrared", "--frames", "12", "-o", flight, "-q")
+    hzn("run", flight, "--ros", "-o", folder / "ros.mcap", "-o", folder / "flight.csv")
+    hzn("run", flight, "-o", folder / "flight.mcap")
+    vectors, matrices = {}, {}
+    with open(folder / "ros.mcap", "rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        topics = ["/hzn/axis_vector", "/hzn/axis_covariance"]
+        for _, channel, message, ros in reader.iter_decoded_messages(topics=topics):
+            if channel.topic == topics[0]:
+                vectors[message.log_time] = np.array([ros.vector.x, ros.vector.y, ros.vector.z])
+            else:
+                matrices[message.log_time] = np.array(list(ros.data)).reshape(3, 3)
+    truth = {round(float(r["time_s"]) * 1e9): axis(r) for r in csv.DictReader(open(flight / "truth.csv", newline=""))}
+    need(vectors.keys() == matrices.keys() == truth.keys() and len(truth) == 12, f"{len(vectors)} of {len(truth)}")
+    misses = {at: vector - truth[at] for at, vector in vectors.items()}
+    nees = [miss @ np.linalg.pinv(matrices[at], rcond=1e-6) @ miss for at, miss in misses.items()]
+    # The 99.7 % points of chi-square with two degrees of freedom, and of the mean of twelve.
+    need(max(nees) < 11.8 and np.mean(nees) < 3.95, f"NEES {nees}")
+    print(f"bag of a flight: 12 answers, NEES (2 degrees of freedom) {np.mean(nees):.2f}, at most {max(nees):.2f}")
+    programs = re.findall(r"(?s)```python\n(.*?)```", BOOK.read_text())
+    printed = []
+    with contextlib.chdir(folder):
+        for program in programs:
+            with contextlib.redirect_stdout(io.StringIO()) as out:
+                exec(compile(program, str(BOOK), "exec"), {})
+            printed.append(out.getvalue())
+    # The first and the last print a line for each picture; the other one writes a bag.
+    need([len(text.splitlines()) for text in printed] == [12, 0, 12], f"lines of the programs: {printed}")
+    rows = {round(float(r["time_s"]) * 1e9): axis(r) for r in csv.DictReader(open(folder / "flight.csv", newline=""))}
+    with Reader(folder / "nadir") as bag:
+        read = {at: store.deserialize_cdr(data, topic.msgtype).vector for topic, at, data in bag.messages()}
+    need(read.keys() == rows.keys(), f"times of the bag: {sorted(read)}")
+    for at, vector in read.items():
+        need(np.array_equal([vector.x, vector.y, vector.z], rows[at]), "axis in the bag of the book")
 
 
 def check_compressed(folder):
@@ -211,6 +259,7 @@ def main():
     answers, rows = check_encodings(folder, store)
     check_answers(answers, rows)
     check_bytes_of_rosbags(answers, store, rows)
+    check_flight(folder, store)
     check_compressed(folder)
     check_refused(folder, store)
     print(f"check_ros: {len(rows)} encodings, 2 compressed pictures, and the answers as messages of ROS are right")

@@ -26,13 +26,15 @@ def fixed_from_vehicle(attitude, epoch):
     return np.array(attitude.rotation_matrix(epoch).to_matrix()).T
 
 
-def misses(attitude, start, vehicle, solution):
-    """Compare with the rows of a vehicle.csv, at the times of the rows of nav.csv (phase ``smoothed``).
+def misses(attitude_at, vehicle, solution):
+    """Compare an attitude with the rows of a vehicle.csv, at the times of the rows of nav.csv (phase ``smoothed``).
 
-    ``start`` is the epoch of time 0. Returns the errors about x, y and z of the vehicle, in sigmas, shape (times, 3).
+    ``attitude_at`` gives the matrix from the vehicle to ECEF at a time in seconds. Returns two arrays: the errors about
+    x, y and z of the vehicle in sigmas, shape (times, 3), and their squares in the whole covariance (NEES, 3 degrees of
+    freedom).
     """
     times = np.array([float(row["time_s"]) for row in vehicle])
-    out = []
+    sigmas, nees = [], []
     for row in solution:
         time_s = float(row["time_s"])
         i = np.argmin(np.abs(times - time_s))
@@ -41,10 +43,13 @@ def misses(attitude, start, vehicle, solution):
         w, *xyz = (float(vehicle[i][name]) for name in ("qw", "qx", "qy", "qz"))
         truth = np.array(bh.Quaternion(w, *xyz).to_rotation_matrix().to_matrix()).T
         # For a small error, the matrix is 1 plus the cross product with the turn.
-        error = truth.T @ fixed_from_vehicle(attitude, start + time_s)
+        error = truth.T @ attitude_at(time_s)
         turn = np.degrees([error[2, 1] - error[1, 2], error[0, 2] - error[2, 0], error[1, 0] - error[0, 1]]) / 2
-        out.append(turn / [float(row[f"sigma_{axis}_deg"]) for axis in "xyz"])
-    return np.array(out)
+        sigmas.append(turn / [float(row[f"sigma_{axis}_deg"]) for axis in "xyz"])
+        of = ("xx", "xy", "xz", "yy", "yz", "zz")
+        xx, xy, xz, yy, yz, zz = (float(row[f"attitude_cov_{axes}_deg2"]) for axes in of)
+        nees.append(turn @ np.linalg.solve([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], turn))
+    return np.array(sigmas), np.array(nees)
 
 
 if __name__ == "__main__":
