@@ -1,6 +1,8 @@
 //! Pictures in the files of scientific programs: one plane of FITS, an array of NumPy, a grey TIFF of 32 or 64 bits.
 
-use std::io::{Cursor, Read, Seek};
+#[cfg(feature = "recordings")]
+use std::io::Cursor;
+use std::io::{Read, Seek};
 
 use hzn_core::image::Layout;
 use hzn_files::png::Contents;
