@@ -258,6 +258,10 @@ def choose(args, state, listed):
     """Returns the mutants to build: the survivors of the state, or more than are wanted, since some do not compile."""
     if args.again:
         old = {key for key, one in state["mutants"].items() if one["outcome"] == "survived"}
+        # Code that is gone cannot be tested: its mutants leave the sample.
+        for key in old - {mutant["key"] for mutant in listed}:
+            print(f"gone      {key}", flush=True)
+            del state["mutants"][key]
         return [mutant for mutant in listed if mutant["key"] in old], None
     files, wanted = draw(listed, args.sample, args.seed)
     return [mutant for name, own in files.items() for mutant in own[:2 + int(1.25 * wanted[name])]], wanted

@@ -43,7 +43,7 @@ fn light(tangent_km: f64, shown: Shown) -> f64 {
 }
 
 /// Returns the part of the light that is left in a column of the picture.
-fn along(x: u32, shown: Shown) -> f64 {
+fn left(x: u32, shown: Shown) -> f64 {
     match shown {
         Shown::Ends if x < 90 => 0.0,
         Shown::Uneven => 0.6 + 0.4 * (f64::from(x) / 6.0).sin(),
@@ -68,7 +68,7 @@ fn place_with_lens(shown: Shown, focal_px: f64, utc: &str, keys: &str) -> Place 
         let at = tangent_km.clamp(-799.0, 298.0) + 800.0;
         let (k, part) = (at as usize, at.fract());
         let brightness = profile[k] * (1.0 - part) + profile[k + 1] * part;
-        image::Luma([(8.0 + 240.0 * (brightness * along(x, shown)).min(1.0)) as u8])
+        image::Luma([(8.0 + 240.0 * (brightness * left(x, shown)).min(1.0)) as u8])
     };
     std::fs::create_dir_all(place.path("in")).unwrap();
     image::GrayImage::from_fn(480, 360, pixel).save(place.path("in/a.png")).unwrap();

@@ -162,7 +162,7 @@ fn a_file_outside_the_folder_is_written_only_if_the_user_agrees() {
     click(&mut window, "Save changes");
     assert!(asks(&window), "saving before leaving asks, too");
     click(&mut window, "Cancel");
-    assert_eq!(window.state().sequence().inputs, [last.clone()]);
+    assert_eq!(window.state().sequence().inputs, std::slice::from_ref(&last));
     save(&mut window);
     assert!(asks(&window));
     click(&mut window, "Save into the folder…");
