@@ -78,9 +78,10 @@ def text(state):
         "", "| part | mutants | caught | ended by the limit of time | survived |", "|---|---:|---:|---:|---:|", *rows,
         "", "| survivor | why |", "|---|---|",
         *(f"| {name(one)} | {reasons.get(key, 'not explained: ' + one['by'])} |" for key, one in survivors),
-        "", "| ended by the limit of time | in |", "|---|---|",
-        *(f"| {name(one)} | `{one['by']}` |" for _, one in sorted(mutants.items()) if one["outcome"] == "timeout"),
     ]
+    ended = [f"| {name(one)} | `{one['by']}` |" for _, one in sorted(mutants.items()) if one["outcome"] == "timeout"]
+    if ended:
+        lines += ["", "| ended by the limit of time | in |", "|---|---|", *ended]
     return "\n".join(line.replace("||", "\\|\\|") if line.startswith("| `") and " becomes " in line else line
                      for line in lines)
 
