@@ -5,6 +5,7 @@ import importlib.util
 import math
 import os
 import re
+import resource
 import shutil
 import signal
 import threading
@@ -76,7 +77,10 @@ def test_two_thousand_frames_and_a_worker_that_dies(client, archive, small, tmp_
     victim = next(iter(client.run(os.getpid).values()))
     killer = threading.Thread(target=kill_one, daemon=True)
     killer.start()
+    began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     result = process_archive(archive, small, client=client, out=str(out), shard_frames=50)
+    took, more = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    print(f"{FRAMES} pictures: {FRAMES / took:.0f} a second; the client's memory grew by {more / 1024:.0f} MB")
     killer.join()
     client.wait_for_workers(2, timeout=60)
     assert victim not in client.run(os.getpid).values()
