@@ -111,7 +111,9 @@ class Tree:
                 path.write_bytes(content)
 
     def cargo(self, words):
-        environment = os.environ | {"CARGO_TARGET_DIR": str(self.build), "CARGO_INCREMENTAL": "1"}
+        # A mutant that always panics does so only where it is chosen.
+        environment = os.environ | {"CARGO_TARGET_DIR": str(self.build), "CARGO_INCREMENTAL": "1",
+                                    "RUSTFLAGS": "-Aunconditional_panic -Aarithmetic_overflow"}
         done = subprocess.run(["cargo", *words, "--message-format=json"], cwd=self.path, env=environment,
                               capture_output=True, text=True, check=False)
         return done, [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
