@@ -1,9 +1,9 @@
 //! Gate: the edge of the airglow is that of a layer. Below it the light becomes less again, down to the ground, whose
 //! own edge may be seen in moonlight. The ground itself, clouds and the lights of most cities have no such trough.
 //!
-//! A line of cities along a coast has one. But nothing stands above the layer, so that its light is seen along the whole
-//! limb, and a line of sight runs through 700 km of it, so that its light changes little along a picture. A line of
-//! cities ends, has gaps, or has lights of every brightness.
+//! A line of cities along a coast has one. But nothing stands above the layer, so that its light is seen along the
+//! whole limb, and a line of sight runs through 700 km of it, so that its light changes little along a picture. A line
+//! of cities ends, has gaps, or has lights of every brightness.
 //!
 //! The gate `glow` asks for no light beyond the edge. Where the picture ends next to the edge, the layer may be outside
 //! of it, and the edge that of the ground; so the sky beyond the edge must be in view.
@@ -40,8 +40,8 @@ const LAST_DARK: usize = 8;
 /// that show it. The layer is as bright everywhere along a picture; ground and clouds are not.
 const TROUGH_OF_PLACE: f64 = 0.92;
 const EVERYWHERE: f64 = 0.9;
-/// Number of places around the limb at which the light of the layer is compared, the smallest light of a place as a part
-/// of their median, and the smallest part of the places in view that have it.
+/// Number of places around the limb at which the light of the layer is compared, the smallest light of a place as a
+/// part of their median, and the smallest part of the places in view that have it.
 // Waves change the light of a layer by some tens of percent. Of 91 drawn layers, whose light is that of their geometry
 // and the noise, the darkest twentieth of the edge has 0.75 of the median or more.
 const AROUND: usize = 256;
