@@ -27,7 +27,7 @@ const SCENES: [(&str, &[&str], &str, &str); 5] = [
     ("full-disc", &["--frames", "4"], "1", "gallery/full-disc"),
     ("leo-infrared", &["--frames", "4"], "1", "gallery/infrared"),
     ("sun-moon", &["--frames", "4"], "1", "gallery/sun-moon"),
-    ("saturn", &["--frames", "4", "--no-noise"], "1", "gallery/saturn"),
+    ("saturn", &["--frames", "12", "--no-noise"], "9", "gallery/saturn"),
 ];
 
 /// Width of the pictures in the documents, in pixels: the caption stays readable.
@@ -50,29 +50,35 @@ fn make() -> Result<(), Trouble> {
         let file = Path::new("tests/data/real").join(photograph);
         let beside = file.with_file_name("sensor.toml");
         let sensor = if beside.exists() { beside } else { file.with_extension("toml") };
+        for copied in [&file, &sensor] {
+            let to = folder.join(copied);
+            fs::create_dir_all(to.parent().unwrap_or(&folder))?;
+            fs::copy(copied, to)?;
+        }
         hzn(&folder, &["explain", &file.to_string_lossy(), "--sensor", &sensor.to_string_lossy()], name)?;
     }
     for (scene, options, index, name) in SCENES {
         let flight = folder.join(scene);
         if !flight.exists() {
             let mut command = Command::new(target().join("debug/hzn"));
-            command.args(["simulate", scene, "-q", "-o"]).arg(&flight).args(options);
+            command.current_dir(&folder).args(["simulate", scene, "-q", "-o", scene]).args(options);
             steps::run(&mut command)?;
         }
-        hzn(&folder, &["explain", &flight.to_string_lossy(), "--index", index], name)?;
+        hzn(&folder, &["explain", scene, "--index", index], name)?;
     }
-    let (lens, map) = (folder.join("leo-infrared/sensor.toml"), folder.join("camera-map.png"));
     let mut command = Command::new(target().join("debug/hzn"));
-    command.args(["camera", "show"]).arg(&lens).arg("--picture").arg(&map).arg("--force");
-    steps::run(command.stdout(Stdio::null()))?;
-    reduce(&map, "camera-map")
+    command.current_dir(&folder).args(["camera", "show", "leo-infrared/sensor.toml"]);
+    steps::run(command.args(["--picture", "camera-map.png", "--force"]).stdout(Stdio::null()))?;
+    reduce(&folder.join("camera-map.png"), "camera-map")
 }
 
-/// Draws a picture with `hzn`, and writes it reduced into book/images.
+/// Draws a picture with `hzn`, and writes it reduced into book/images. The command runs in the folder of the pictures,
+/// because the caption has the command, and no path of this machine belongs into the documents.
 fn hzn(folder: &Path, args: &[&str], name: &str) -> Result<(), Trouble> {
-    let drawn = folder.join(name.replace('/', "-")).with_extension("png");
+    let file = format!("{}.png", name.rsplit('/').next().unwrap_or(name));
+    let drawn = folder.join(&file);
     let mut command = Command::new(target().join("debug/hzn"));
-    command.args(args).arg("--overlay").arg(&drawn).arg("--force").stdout(Stdio::null());
+    command.current_dir(folder).args(args).args(["--overlay", &file]).arg("--force").stdout(Stdio::null());
     show(&command);
     // A refused picture has an overlay, too.
     command.status()?;
