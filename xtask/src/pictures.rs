@@ -8,9 +8,11 @@ use crate::machine::{has, root, target};
 use crate::steps::{self, Trouble, show};
 use crate::test_build::build_tests;
 
+/// The photograph of the demo with its sensor, whose printed answer stands below the picture on the first page.
+const FIRST: [&str; 2] = ["crates/hzn-cli/assets/iss-limb-2020-11-20.jpg", "crates/hzn-cli/assets/iss.toml"];
+
 /// Photographs in tests/data/real, and the pictures in book/images that are made from them.
-const PHOTOGRAPHS: [(&str, &str); 8] = [
-    ("iss-limb-2020-11-20.jpg", "iss-limb"),
+const PHOTOGRAPHS: [(&str, &str); 7] = [
     ("iss064e002941-solar-array.jpg", "gallery/solar-array"),
     ("opssat-2020-08-16.png", "gallery/ops-sat"),
     ("jupiter/jupiter-cassini-n1352037683.png", "gallery/jupiter"),
@@ -46,16 +48,12 @@ fn make() -> Result<(), Trouble> {
     build_tests()?;
     let folder = target().join("xtask").join("pictures");
     fs::create_dir_all(&folder)?;
-    for (photograph, name) in PHOTOGRAPHS {
-        let file = Path::new("tests/data/real").join(photograph);
+    photograph(&folder, FIRST.map(Path::new), "iss-limb")?;
+    for (file, name) in PHOTOGRAPHS {
+        let file = Path::new("tests/data/real").join(file);
         let beside = file.with_file_name("sensor.toml");
         let sensor = if beside.exists() { beside } else { file.with_extension("toml") };
-        for copied in [&file, &sensor] {
-            let to = folder.join(copied);
-            fs::create_dir_all(to.parent().unwrap_or(&folder))?;
-            fs::copy(copied, to)?;
-        }
-        hzn(&folder, &["explain", &file.to_string_lossy(), "--sensor", &sensor.to_string_lossy()], name)?;
+        photograph(&folder, [&file, &sensor], name)?;
     }
     for (scene, options, index, name) in SCENES {
         let flight = folder.join(scene);
@@ -70,6 +68,17 @@ fn make() -> Result<(), Trouble> {
     command.current_dir(&folder).args(["camera", "show", "leo-infrared/sensor.toml"]);
     steps::run(command.args(["--picture", "camera-map.png", "--force"]).stdout(Stdio::null()))?;
     reduce(&folder.join("camera-map.png"), "camera-map")
+}
+
+/// Copies a photograph and its sensor below the folder, and draws its picture there.
+fn photograph(folder: &Path, files: [&Path; 2], name: &str) -> Result<(), Trouble> {
+    for file in files {
+        let copy = folder.join(file);
+        fs::create_dir_all(copy.parent().unwrap_or(folder))?;
+        fs::copy(file, copy)?;
+    }
+    let [picture, sensor] = files.map(Path::to_string_lossy);
+    hzn(folder, &["explain", &picture, "--sensor", &sensor], name)
 }
 
 /// Draws a picture with `hzn`, and writes it reduced into book/images. The command runs in the folder of the pictures,
