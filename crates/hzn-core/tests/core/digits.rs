@@ -5,6 +5,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use crate::drawn::Noise;
 use hzn_core::body::{Kind, Night};
 use hzn_core::camera::{self, Model};
 use hzn_core::frames::{Cam, Fixed, Rotation, UnitVec3};
@@ -14,19 +15,6 @@ use hzn_core::{Config, HostHorizon, Prior, Report, consensus, covariance, edge_p
 
 const SIZE: [u16; 2] = [320, 240];
 const FOCAL_PX: f64 = 600.0;
-
-/// Random numbers for noise, whose sum is nearly normal.
-struct Noise(u64);
-
-impl Noise {
-    fn normal(&mut self) -> f64 {
-        let mut uniform = || {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 40) as f64 / f64::from(1u32 << 24)
-        };
-        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-    }
-}
 
 /// Draws a picture from the light at each image point, in counts, with noise of 1.5 counts.
 // Only functions of libm take part, so that the pictures are the same on every machine.
