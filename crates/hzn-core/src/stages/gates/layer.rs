@@ -42,8 +42,7 @@ const TROUGH_OF_PLACE: f64 = 0.92;
 const EVERYWHERE: f64 = 0.9;
 /// Number of places around the limb at which the light of the layer is compared, the smallest light of a place as a
 /// part of their median, and the smallest part of the places in view that have it.
-// Waves change the light of a layer by some tens of percent. Of 91 drawn layers, whose light is that of their geometry
-// and the noise, the darkest twentieth of the edge has 0.75 of the median or more.
+// Waves change the light of a layer by some tens of percent, so that half of the median is left nearly everywhere.
 const AROUND: usize = 256;
 const EVEN: f64 = 0.5;
 const MOST_EVEN: f64 = 0.95;
