@@ -1,10 +1,12 @@
 //! A small map of all directions around the optical axis, for an axis that lies outside the picture.
 
-use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
+use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
 use hzn_core::camera::Camera;
 use hzn_core::pixel::ImagePoint;
 
+use super::arrow::Arrow;
 use crate::model::settings::Layer;
+use crate::ui::placement::Placement;
 use crate::ui::theme;
 use crate::ui::viewer::Viewer;
 use crate::work::FrameView;
@@ -15,13 +17,21 @@ const SIZE: f32 = 170.0;
 const PART: f32 = 0.28;
 /// Width of a map in points that has room for the long text below it.
 const LONG_TEXT: f32 = 150.0;
+/// Height in points of the badge of the zoom, with its distance from the map.
+const BADGE_HEIGHT: f32 = 30.0;
 /// Points on a side of the picture's border, and around the limb.
 const SIDE: usize = 24;
 const AROUND: usize = 120;
 
-/// Draws the map in the upper right corner, if the axis of the answer lies outside the picture. The distance from its
-/// centre is the angle from the optical axis.
-pub(super) fn draw(viewer: &Viewer, painter: &Painter, frame_view: &FrameView, outcome: &Outcome, rect: Rect) {
+/// Draws the map in a corner, if the axis of the answer lies outside the picture. The distance from its centre is the
+/// angle from the optical axis.
+pub(super) fn draw(
+    viewer: &Viewer,
+    painter: &Painter,
+    frame_view: &FrameView,
+    outcome: &Outcome,
+    placement: &Placement<'_>,
+) {
     let body = outcome.bodies.get(viewer.body).or(outcome.bodies.first());
     let (Some(body), Some(camera), Some(size)) = (body, frame_view.camera.as_deref(), frame_view.size()) else {
         return;
@@ -30,7 +40,8 @@ pub(super) fn draw(viewer: &Viewer, painter: &Painter, frame_view: &FrameView, o
     if !viewer.settings.shows(Layer::Axis) || body.axis.is_some_and(inside) {
         return;
     }
-    let Some(map) = Map::new(body, camera, rect) else { return };
+    let arrow = Arrow::new(painter, placement, body);
+    let Some(map) = Map::new(body, camera, painter.clip_rect(), arrow.map(|arrow| arrow.area())) else { return };
     painter.rect_filled(map.frame, 6, Color32::from_black_alpha(200));
     let painter = painter.with_clip_rect(map.frame);
     for degrees in [30, 60, 90, 120, 150] {
@@ -63,7 +74,7 @@ struct Map {
 }
 
 impl Map {
-    fn new(body: &BodyResult, camera: &Camera<f64>, rect: Rect) -> Option<Self> {
+    fn new(body: &BodyResult, camera: &Camera<f64>, rect: Rect, taken: Option<Rect>) -> Option<Self> {
         let s = body.solution()?;
         let off_deg = s.axis.xyz()[2].clamp(-1.0, 1.0).acos().to_degrees();
         let far_deg = off_deg + s.fused_half_angle_rad.to_degrees();
@@ -71,8 +82,7 @@ impl Map {
         let corner_deg = corner.map_or(90.0, |ray| ray.xyz()[2].clamp(-1.0, 1.0).acos().to_degrees());
         let most_deg = (far_deg.max(corner_deg) * 1.08).min(180.0);
         let width = SIZE.min(rect.width() * PART).min(rect.height() * PART * 1.4);
-        let frame =
-            Rect::from_min_size(pos2(rect.right() - width - 10.0, rect.top() + 10.0), vec2(width, width + 14.0));
+        let frame = place(vec2(width, width + 14.0), rect, taken);
         let centre = frame.center() - vec2(0.0, 7.0);
         Some(Self { frame, centre, radius: width / 2.0 - 6.0, most_deg })
     }
@@ -86,6 +96,14 @@ impl Map {
         let distance = z.clamp(-1.0, 1.0).acos().to_degrees() / self.most_deg;
         self.centre + vec2((x / length * distance) as f32, (y / length * distance) as f32) * self.radius
     }
+}
+
+/// Returns the corner of the map: the upper right one, or the lower right one if the arrow to the axis is in the way.
+fn place(size: Vec2, rect: Rect, taken: Option<Rect>) -> Rect {
+    let upper = Rect::from_min_size(pos2(rect.right() - size.x - 10.0, rect.top() + 10.0), size);
+    // The badge of the zoom is below the lower one.
+    let lower = upper.translate(vec2(0.0, (rect.height() - size.y - 20.0 - BADGE_HEIGHT).max(0.0)));
+    if taken.is_some_and(|taken| taken.intersects(upper)) { lower } else { upper }
 }
 
 /// Returns the border of the picture. A pixel outside the image circle has no direction.
@@ -120,6 +138,17 @@ fn around(axis: [f64; 3], half_angle_rad: f64) -> impl Iterator<Item = [f64; 3]>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_map_gives_way_to_the_arrow() {
+        let (rect, size) = (Rect::from_min_size(pos2(200.0, 40.0), vec2(790.0, 520.0)), vec2(170.0, 184.0));
+        let upper = place(size, rect, None);
+        assert!(rect.contains_rect(upper) && upper.top() == 50.0);
+        assert_eq!(place(size, rect, Some(Rect::from_min_size(pos2(300.0, 100.0), vec2(40.0, 40.0)))), upper);
+        let taken = Rect::from_min_size(pos2(780.0, 160.0), vec2(200.0, 20.0));
+        let lower = place(size, rect, Some(taken));
+        assert!(rect.contains_rect(lower) && !lower.intersects(taken), "{lower:?}");
+    }
 
     #[test]
     fn directions_around_a_cone_have_its_half_angle() {

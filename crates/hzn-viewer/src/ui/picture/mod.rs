@@ -1,5 +1,6 @@
 //! The panel with the picture and its overlays.
 
+mod arrow;
 mod circle;
 mod ground;
 mod inset;
@@ -78,7 +79,7 @@ fn show_pane(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, rect: Rec
     let outcome = frame_view.answers.get(pane);
     if let Some(outcome) = outcome.filter(|_| !viewer.layers_hidden) {
         overlays::draw(viewer, &painter, frame_view, outcome, &placement);
-        inset::draw(viewer, &painter, frame_view, outcome, rect);
+        inset::draw(viewer, &painter, frame_view, outcome, &placement);
     }
     if pane == 0 {
         draw_tools(viewer, ui, &painter, frame_view, &placement);
