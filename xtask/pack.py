@@ -1,7 +1,7 @@
 """Makes the files of `cargo xtask dist`, with the same bytes on every machine: times, owners and order are fixed.
 
     pack.py archive FOLDER FILE         FOLDER as FILE, a .tar.xz or .zip
-    pack.py wheel WHEEL PROGRAM         WHEEL with the executable PROGRAM among its scripts
+    pack.py wheel WHEEL PROGRAM TEXT    WHEEL with the executable PROGRAM among its scripts, and TEXT among its licences
     pack.py deb FOLDER FILE             FOLDER, which has debian/control and the files below root/, as FILE (.deb)
     pack.py glibc FILE                  prints the newest GLIBC version that FILE or a program in a wheel needs
     pack.py sums FOLDER                 FOLDER/SHA256SUMS of all files in it
@@ -87,25 +87,30 @@ def deb(folder: Path, out: Path) -> None:
             made.write(data + b"\n" * (len(data) % 2))
 
 
-def wheel(path: Path, program: Path) -> None:
-    """Add the program to the scripts of a wheel, and to its RECORD."""
+def wheel(path: Path, program: Path, text: Path) -> None:
+    """Add the program to the scripts of a wheel, the text to its licences, and both to its RECORD."""
     name, version = path.name.split("-")[:2]
-    at = f"{name}-{version}.data/scripts/{program.name}"
-    data = program.read_bytes()
-    digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
+    added = [
+        (f"{name}-{version}.dist-info/licenses/{text.name}", 0o644, text.read_bytes()),
+        (f"{name}-{version}.data/scripts/{program.name}", 0o755, program.read_bytes()),
+    ]
+    places = {place for place, _, _ in added}
     with zipfile.ZipFile(path) as old:
-        entries = [(info, old.read(info)) for info in old.infolist() if info.filename != at]
+        entries = [(info, old.read(info)) for info in old.infolist() if info.filename not in places]
     with zipfile.ZipFile(path, "w") as new:
         for info, contents in entries:
             if info.filename.endswith(".dist-info/RECORD"):
-                kept = [line for line in contents.decode().splitlines() if not line.startswith(at + ",")]
-                contents = "\n".join([f"{at},sha256={digest},{len(data)}", *kept, ""]).encode()
-                record = (info, contents)
+                record = (info.filename, contents.decode().splitlines())
                 continue
             new.writestr(zipped(info.filename, (info.external_attr >> 16) & 0o777 or 0o644), contents)
-        new.writestr(zipped(at, 0o755), data)
+        lines = []
+        for place, mode, data in added:
+            new.writestr(zipped(place, mode), data)
+            digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
+            lines.append(f"{place},sha256={digest},{len(data)}")
         # RECORD is the last file, as the format of wheels recommends.
-        new.writestr(zipped(record[0].filename, 0o644), record[1])
+        lines += [line for line in record[1] if line.split(",")[0] not in places]
+        new.writestr(zipped(record[0], 0o644), "\n".join([*lines, ""]).encode())
 
 
 def glibc(path: Path) -> str:

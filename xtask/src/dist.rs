@@ -79,20 +79,21 @@ struct Dist {
 }
 
 /// Makes the parts that the arguments name. A part that this machine cannot make is named with what it needs.
-pub(crate) fn run(args: &[String]) -> Result<(), String> {
-    std::env::set_current_dir(root()).map_err(|e| e.to_string())?;
+fn make(args: &[String]) -> Outcome {
+    std::env::set_current_dir(root())?;
+    let wrong = |what: String| Trouble::Failed(format!("{what}\n{USAGE}"));
     let (mut triple, mut profile, mut wanted) = (None, "dist".to_owned(), Vec::new());
     let mut args = args.iter();
     while let Some(arg) = args.next() {
-        let mut value = || args.next().cloned().ok_or_else(|| format!("{arg}: a value is missing\n{USAGE}"));
+        let mut value = || args.next().cloned().ok_or_else(|| wrong(format!("{arg}: a value is missing")));
         match arg.as_str() {
             "--target" => triple = Some(value()?),
             "--profile" => profile = value()?,
             part if PARTS.iter().any(|(name, _)| *name == part) => wanted.push(part),
-            other => return Err(format!("{other} is neither an option nor a part\n{USAGE}")),
+            other => return Err(wrong(format!("{other} is neither an option nor a part"))),
         }
     }
-    let dist = Dist::new(triple, profile).map_err(Trouble::into_message)?;
+    let dist = Dist::new(triple, profile)?;
     let selected = PARTS.iter().filter(|(name, _)| match wanted.as_slice() {
         [] => !ONLY_NAMED.contains(name),
         wanted => wanted.contains(name),
@@ -103,26 +104,33 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         match make(&dist) {
             Ok(()) => {}
             Err(Trouble::Missing(why)) => left_out.push(format!("{name}: left out, {why}")),
-            Err(Trouble::Failed(why)) => return Err(format!("{name}: {why}")),
+            Err(Trouble::Failed(why)) => return Err(Trouble::Failed(format!("{name}: {why}"))),
         }
     }
     println!("\n{}", dist.out().display());
     left_out.iter().for_each(|line| println!("{line}"));
-    let strict = std::env::var("CI").is_ok_and(|v| v == "true");
-    if strict && !left_out.is_empty() { Err(left_out.join("\n")) } else { Ok(()) }
+    if left_out.is_empty() { Ok(()) } else { Err(Trouble::Missing(left_out.join("; "))) }
+}
+
+/// Makes the parts that the arguments name. With `CI=true`, nothing may be left out.
+pub(crate) fn run(args: &[String]) -> Result<(), String> {
+    match make(args) {
+        Err(Trouble::Missing(why)) if std::env::var("CI").is_ok_and(|v| v == "true") => Err(why),
+        Ok(()) | Err(Trouble::Missing(_)) => Ok(()),
+        Err(Trouble::Failed(why)) => Err(why),
+    }
 }
 
 /// Makes the files of a release for this machine and tries them. Then makes those for the other processor, and compares
 /// the answers of its program. Last, checks the command for other systems.
 pub(crate) fn try_release() -> Outcome {
-    let run =
-        |args: &[&str]| run(&args.iter().map(|arg| (*arg).to_owned()).collect::<Vec<_>>()).map_err(Trouble::Failed);
-    run(&[])?;
+    let make = |args: &[&str]| make(&args.iter().map(|arg| (*arg).to_owned()).collect::<Vec<_>>());
+    make(&[])?;
     if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
         return Ok(());
     }
-    run(&["--target", "aarch64-unknown-linux-musl"])?;
-    run(&["systems"])
+    make(&["--target", "aarch64-unknown-linux-musl"])?;
+    make(&["systems"])
 }
 
 impl Dist {
@@ -151,9 +159,9 @@ impl Dist {
     fn processor(&self) -> &str {
         self.triple.split('-').next().unwrap_or_default()
     }
-    /// Returns the folder of the finished files.
+    /// Returns the folder of the finished files. `target/dist` is that of cargo for the profile `dist`.
     fn out(&self) -> PathBuf {
-        target().join("dist")
+        target().join("release-files")
     }
     /// Returns a folder for files on the way.
     fn work(&self) -> PathBuf {
@@ -262,6 +270,7 @@ impl Dist {
         for text in ["README.md", "CHANGELOG.md", "LICENSE-MIT", "LICENSE-APACHE"] {
             copy(Path::new(text), &folder.join(text))?;
         }
+        copy(&self.supply(&self.triple)?.join("THIRD-PARTY.txt"), &folder.join("THIRD-PARTY.txt"))?;
         let shells = folder.join("completions");
         let [bash, zsh, fish] = ["hzn.bash", "_hzn", "hzn.fish"].map(|name| shells.join(name));
         self.write_helps(&bash, &zsh, &fish, &folder.join("man"))?;
@@ -298,9 +307,14 @@ impl Dist {
         )?;
         let licences = ["LICENSE-MIT", "LICENSE-APACHE"].map(fs::read_to_string);
         let [mit, apache] = licences;
-        let rights = format!("hzn is licensed under MIT or Apache-2.0, at your choice.\n\n{}\n\n{}", mit?, apache?);
+        let rights = format!(
+            "hzn is licensed under MIT or Apache-2.0, at your choice. THIRD-PARTY.txt has the licences of its \
+             parts.\n\n{}\n\n{}",
+            mit?, apache?
+        );
         write(&share.join("doc/hzn/copyright"), rights.as_bytes())?;
-        let kilobytes = fs::metadata(&program)?.len() / 1024;
+        copy(&self.supply(&self.triple)?.join("THIRD-PARTY.txt"), &share.join("doc/hzn/THIRD-PARTY.txt"))?;
+        let kilobytes = bytes_in(&folder.join("root"))? / 1024;
         let control = format!(
             "Package: hzn\nVersion: {}\nArchitecture: {processor}\nMaintainer: the hzn project <hzn@localhost>\n\
              Installed-Size: {kilobytes}\nRecommends: ffmpeg\nSection: science\nPriority: optional\n\
@@ -346,19 +360,29 @@ impl Dist {
         }
         steps::run(&mut maturin)?;
         let wheel = only_file(&wheels)?;
-        self.pack("wheel", &[&wheel, &program])?;
+        // The notices are those of program and library.
+        self.pack("wheel", &[&wheel, &program, &self.supply(triple)?.join("THIRD-PARTY.txt")])?;
         self.check_glibc(&wheel)?;
         copy(&wheel, &self.out().join(wheel.file_name().unwrap_or_default()))
     }
 
+    /// Returns the folder with the lists of parts and the notices of their licences: each system has parts of its own.
+    fn supply(&self, triple: &str) -> Result<PathBuf, Trouble> {
+        let lists = self.work().join("sbom").join(triple);
+        steps::run(cargo(&["run", "--quiet", "--package", "hzn-supply", "--"]).arg(&lists).arg(triple))?;
+        Ok(lists)
+    }
+
+    /// Writes the lists of parts. The library in a wheel for glibc has parts of another system than the static program.
     fn list_parts(&self) -> Outcome {
-        let sbom = ["run", "--quiet", "--package", "hzn-supply", "--"];
-        let lists = fresh(&self.work().join("sbom"))?;
-        // Each system has parts of its own.
-        steps::run(cargo(&sbom).arg(&lists).arg(&self.triple))?;
-        for product in ["hzn-cli", "hzn-py"] {
-            let name = format!("{product}-{}-{}.cdx.json", self.version, self.triple);
-            copy(&lists.join(format!("{product}.cdx.json")), &self.out().join(name))?;
+        let glibc = self.triple.replace("-linux-musl", "-linux-gnu");
+        let mut wanted = vec![("hzn-cli", &self.triple), ("hzn-py", &self.triple)];
+        if glibc != self.triple {
+            wanted.push(("hzn-py", &glibc));
+        }
+        for (product, triple) in wanted {
+            let name = format!("{product}-{}-{triple}.cdx.json", self.version);
+            copy(&self.supply(triple)?.join(format!("{product}.cdx.json")), &self.out().join(name))?;
         }
         Ok(())
     }
@@ -373,6 +397,16 @@ impl Dist {
         }
         self.pack("sums", &[&self.out()])
     }
+}
+
+/// Returns the size of all files in a folder.
+fn bytes_in(folder: &Path) -> Result<u64, Trouble> {
+    let mut bytes = 0;
+    for entry in fs::read_dir(folder)?.flatten() {
+        let path = entry.path();
+        bytes += if path.is_dir() { bytes_in(&path)? } else { fs::metadata(&path)?.len() };
+    }
+    Ok(bytes)
 }
 
 /// Returns an empty folder with this path.

@@ -65,10 +65,10 @@ const USAGE: &str = "usage: cargo xtask COMMAND [OPTION]...; COMMAND is one of t
   campaign <fuzz|kill|long|flips|mutants|coverage|parts> [ARG]...
                      looks for faults, and lists what hzn is built from (see book/results/reliability.md)
   dist [--target TRIPLE] [PART]...
-                     makes the files of a release in target/dist: the static program as an archive and as a Debian
-                     package, the wheel with the program, lists of parts (CycloneDX), SHA256SUMS; then tries them.
-                     The part `crates` compiles each published crate from its package, and `systems` checks the command
-                     for Windows and macOS; both run only if they are named
+                     makes the files of a release in target/release-files: the static program as an archive and as a
+                     Debian package, the wheel with the program, lists of parts (CycloneDX), SHA256SUMS; then tries
+                     them. The part `crates` compiles each published crate from its package, and `systems` checks
+                     the command for Windows and macOS; both run only if they are named
   firmware [--write] builds the images for the flight computer and counts their instructions in QEMU;
                      --write puts the table into book/results/firmware-cost.md;
                      --build only builds the images that every check runs;

@@ -1,4 +1,8 @@
-//! What hzn is built from, as cargo knows it, and as a CycloneDX list of parts (SBOM).
+//! What hzn is built from, as cargo knows it: as a CycloneDX list of parts (SBOM), and as the notices of its licences.
+
+mod notices;
+
+pub use notices::notices;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -26,6 +30,8 @@ pub struct Package {
     pub license: Option<String>,
     /// Registry; `None` for a crate of this repository.
     pub source: Option<String>,
+    /// Path of its Cargo.toml.
+    pub manifest_path: PathBuf,
 }
 
 #[derive(Deserialize)]
@@ -91,23 +97,11 @@ pub fn packages(manifest: &str) -> Vec<Package> {
     metadata(manifest, PLATFORM).packages
 }
 
-/// Returns the CycloneDX list of the parts that are linked into a product for a platform, which is a triple of rustc.
-/// Dependencies for builds and tests are left out. The list depends only on the lock file, so the same commit gives the
-/// same list.
-///
-/// # Panics
-/// The package does not exist, or cargo cannot read the manifest and its lock file.
-pub fn sbom(package: &str, platform: &str) -> Value {
-    let Metadata { packages, resolve } = metadata("Cargo.toml", platform);
-    let lock = std::fs::read_to_string(root().join("Cargo.lock")).expect("a lock file");
-    let lock: Lock = toml::from_str(&lock).expect("a valid lock file");
-    let checksums: BTreeMap<(&str, &str), &str> = lock
-        .package
-        .iter()
-        .filter_map(|p| Some(((p.name.as_str(), p.version.as_str()), p.checksum.as_deref()?)))
-        .collect();
+/// Returns the packages that are linked into a product, without the product itself, in the order of their names.
+/// Dependencies for builds and tests are left out.
+fn linked<'a>(product: &str, Metadata { packages, resolve }: &'a Metadata) -> (&'a Package, Vec<&'a Package>) {
     let nodes: BTreeMap<&str, &Node> = resolve.nodes.iter().map(|node| (node.id.as_str(), node)).collect();
-    let product = packages.iter().find(|p| p.name == package).unwrap_or_else(|| panic!("{package} is no package"));
+    let product = packages.iter().find(|p| p.name == product).unwrap_or_else(|| panic!("{product} is no package"));
     let (mut linked, mut open) = (BTreeSet::new(), vec![product.id.as_str()]);
     while let Some(id) = open.pop() {
         let deps = nodes.get(id).into_iter().flat_map(|node| &node.deps);
@@ -117,6 +111,25 @@ pub fn sbom(package: &str, platform: &str) -> Value {
     }
     let mut parts: Vec<&Package> = packages.iter().filter(|p| linked.contains(p.id.as_str())).collect();
     parts.sort_by_key(|p| (p.name.as_str(), p.version.as_str()));
+    (product, parts)
+}
+
+/// Returns the CycloneDX list of the parts that are linked into a product for a platform, which is a triple of rustc.
+/// Dependencies for builds and tests are left out. The list depends only on the lock file, so the same commit gives the
+/// same list.
+///
+/// # Panics
+/// The package does not exist, or cargo cannot read the manifest and its lock file.
+pub fn sbom(package: &str, platform: &str) -> Value {
+    let graph = metadata("Cargo.toml", platform);
+    let lock = std::fs::read_to_string(root().join("Cargo.lock")).expect("a lock file");
+    let lock: Lock = toml::from_str(&lock).expect("a valid lock file");
+    let checksums: BTreeMap<(&str, &str), &str> = lock
+        .package
+        .iter()
+        .filter_map(|p| Some(((p.name.as_str(), p.version.as_str()), p.checksum.as_deref()?)))
+        .collect();
+    let (product, parts) = linked(package, &graph);
     let component = |p: &Package, kind: &str| {
         let mut part = json!({
             "type": kind,

@@ -12,16 +12,19 @@ use crate::steps::{self, Outcome, Trouble, processor_seconds};
 
 /// The versions of Python 3 that the wheel is tried with.
 const MINORS: std::ops::RangeInclusive<u32> = 10..=14;
-/// Most processor time from a file to its first answer, s. Wall time would depend on what else the machine does.
+/// Most processor time from a file to its first answer, s. Wall time is printed, too, but it depends on what else the
+/// machine does.
 const LIMIT_S: f64 = 60.0;
 /// Uses the library, and reads the licences: a link that was packed as a file has only a few bytes.
 const IMPORT: &str = "\
 import hzn, importlib.metadata
 print(hzn.simulate('rocket-clean', frames=2)[1].image.shape, hzn.__version__)
 texts = [file.read_text() for file in importlib.metadata.files('hzn-sensor') if 'LICENSE' in file.name]
-assert len(texts) >= 2 and min(map(len, texts)) > 1000, [len(text) for text in texts]";
-/// The licences of a package have at least this many bytes.
-const LICENCE_BYTES: u64 = 1000;
+assert len(texts) >= 2 and min(map(len, texts)) > 1000, [len(text) for text in texts]
+[parts] = [file.read_text() for file in importlib.metadata.files('hzn-sensor') if 'THIRD-PARTY' in file.name]
+assert 'pyo3' in parts and 'clap' in parts";
+/// The licences, manual pages and completions of a package have at least this many bytes.
+const TEXT_BYTES: u64 = 1000;
 
 impl Dist {
     /// Runs the archive in an empty root folder, looks into the Debian package, and runs the wheel. A program for
@@ -29,6 +32,7 @@ impl Dist {
     pub(super) fn try_files(&self) -> Outcome {
         if !self.is_linux() {
             self.need_own_processor()?;
+            self.check_sums()?;
             let unpacked = fresh(&self.work().join("empty"))?;
             steps::run(self.tool("python").args(["-m", "zipfile", "-e"]).arg(self.archive()).arg(&unpacked))?;
             let alone = unpacked.join(self.name());
@@ -44,14 +48,13 @@ impl Dist {
             self.try_wheel()?;
             return self.try_musl_wheel();
         }
-        self.try_musl_wheel()?;
         let ours = fresh(&self.work().join("ours"))?;
         steps::run(Command::new(self.own_program()?).arg("demo").current_dir(&ours))?;
         let mut compare = self.tool("python");
         compare.arg("xtask/same_rows.py").arg(ours.join("hzn-demo/flight.csv")).arg(flight);
         steps::run(&mut compare)?;
         println!("the wheel for {} is not run here; its own machine in the workflow `release` does", self.processor());
-        Ok(())
+        self.try_musl_wheel()
     }
 
     fn has_own_processor(&self) -> bool {
@@ -78,8 +81,8 @@ impl Dist {
         let unpacked = fresh(&self.work().join("empty").join(&self.triple))?;
         steps::run(self.tool("python").args(["-m", "tarfile", "-e"]).arg(&archive).arg(&unpacked))?;
         let alone = unpacked.join(self.name());
-        for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
-            need_text(&alone.join(licence))?;
+        for text in ["LICENSE-MIT", "LICENSE-APACHE", "THIRD-PARTY.txt", "man/hzn-run.1", "completions/hzn.bash"] {
+            need_text(&alone.join(text))?;
         }
         let mut run = self.command_alone(&alone)?;
         let (how, limit_s) = if self.has_own_processor() { ("", LIMIT_S) } else { (", emulated", f64::INFINITY) };
@@ -157,7 +160,9 @@ impl Dist {
                 return Err(Trouble::Failed(format!("{} is without {part}", package.display())));
             }
         }
-        need_text(&unpacked.join("usr/share/doc/hzn/copyright"))?;
+        for text in ["copyright", "THIRD-PARTY.txt"] {
+            need_text(&unpacked.join("usr/share/doc/hzn").join(text))?;
+        }
         steps::run(self.command_alone(&unpacked.join("usr/bin"))?.arg("--version"))
     }
 
@@ -171,6 +176,9 @@ impl Dist {
         steps::run(self.tool("python").args(["-m", "zipfile", "-e"]).arg(&wheel).arg(&unpacked))?;
         let scripts = unpacked.join(format!("hzn_sensor-{}.data/scripts", self.version));
         make_executable(&scripts.join("hzn"))?;
+        for text in ["LICENSE-MIT", "LICENSE-APACHE", "THIRD-PARTY.txt"] {
+            need_text(&unpacked.join(format!("hzn_sensor-{}.dist-info/licenses", self.version)).join(text))?;
+        }
         steps::run(self.command_alone(&scripts)?.arg("--version"))
     }
 
@@ -224,11 +232,11 @@ impl Dist {
     }
 }
 
-/// Fails if a file has no text of the length of a licence.
+/// Fails if a text is missing or too short: a link that was packed as a file has only a few bytes.
 fn need_text(path: &Path) -> Outcome {
     let bytes = fs::metadata(path).map_or(0, |about| about.len());
-    let short = || Trouble::Failed(format!("{}: {bytes} bytes are no licence", path.display()));
-    (bytes > LICENCE_BYTES).then_some(()).ok_or_else(short)
+    let short = || Trouble::Failed(format!("{}: {bytes} bytes are too few", path.display()));
+    (bytes > TEXT_BYTES).then_some(()).ok_or_else(short)
 }
 
 /// Lets a file be executed: `zipfile` of Python unpacks without the permissions.

@@ -53,6 +53,26 @@ fn the_list_of_parts_is_complete() {
     }
 }
 
+/// Most licences ask that a copy of the program has their text.
+#[test]
+fn the_notices_have_the_licence_of_each_part() {
+    let text = supply::notices(&["hzn-cli", "hzn-py"], supply::PLATFORM);
+    let (list, texts) = text.split_once("\n------").unwrap();
+    for part in ["clap ", "pyo3 ", "zstd-sys ", "epaint_default_fonts "] {
+        let version = list.lines().find(|line| line.starts_with(part)).unwrap_or_else(|| panic!("{part}: {list}"));
+        let name = version.split_once(':').unwrap().0;
+        assert!(texts.contains(name), "{name} has a text");
+    }
+    assert!(!list.contains("hzn-") && list.lines().filter(|line| line.contains(": ")).count() > 200, "{list}");
+    // A package without a text is named, and there are few.
+    let without: Vec<_> = list.lines().filter(|line| line.contains("has no text")).collect();
+    assert!(without.len() < 24, "{without:#?}");
+    for word in ["Permission is hereby granted", "Apache License", "UBUNTU FONT LICENCE", "Redistribution and use"] {
+        assert!(texts.contains(word), "{word}");
+    }
+    assert!(!texts.contains("GNU GENERAL PUBLIC LICENSE"));
+}
+
 /// The page in the browser has no C compiler, no files and no threads, so nothing that it is built from may need them.
 #[test]
 fn the_page_is_built_without_c() {
