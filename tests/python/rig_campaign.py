@@ -9,6 +9,9 @@
 The sensors of the scene `ring` are told a limb height of 15 +- 10 km while the limb is at 25 km. Its change with
 latitude is told or not. The mounts are exact, unless a fault turns one of them.
 
+`faults` turns told mounts, and changes the pictures of one head: repeated ones, those of another epoch, ghosts of the
+limb, ground without a limb. It needs opencv-python-headless.
+
 `coarse` flies the scene with random attitudes and pictures of a quarter of the size, and compares the coarse direction
 with the truth. `mounts` tells mounts that are wrong by about a degree, lets the vehicle turn, and compares the mounts of
 `hzn calibrate rig` with the true ones.
@@ -16,143 +19,19 @@ with the truth. `mounts` tells mounts that are wrong by about a degree, lets the
 
 import argparse
 import concurrent.futures
-import csv
 import math
 import pathlib
 import re
 import shutil
-import subprocess
 import tempfile
 
 import numpy as np
 
-HEADS = ["front", "right", "back", "left"]
-# The half level of the scene is at 25 km, and 4.5 km higher or lower at the poles. The sensors are told 10 km less.
-TOLD = "limb_height_by_latitude_km = [[-90.0, 10.5], [0.0, 15.0], [90.0, 19.5]]\n"
-WEATHER = "\n[world.infrared.weather]\nsigma_km = 1.5\nlength_km = 1000.0\n"
+import rig_design
+from rig_flights import (COUNT_HEAD, HEADS, WEATHER, Count, by_time, hzn, run, simulate, tell_limb, told_mount, truths,
+                         turned, write_rig)
 
-
-def hzn(program, *args):
-    done = subprocess.run([program, *map(str, args)], capture_output=True, text=True)
-    if done.returncode not in (0, 3):
-        raise RuntimeError(f"hzn {' '.join(map(str, args))}: {done.stderr.strip()}")
-    return done.stdout
-
-
-def simulate(program, folder, scene, seed, frames, change=lambda text: text):
-    """Renders a flight whose scene is changed by a function of its text."""
-    text = change(hzn(program, "simulate", scene, "--show"))
-    path = folder.parent / f"{folder.name}.toml"
-    path.write_text(text)
-    hzn(program, "simulate", path, "-o", folder, "--frames", frames, "--seed", seed, "--no-noise", "-q", "--force")
-
-
-def tell_limb(folder, latitudes):
-    """Writes the limb height into the sensors, 10 km too low, with or without its change with latitude."""
-    for head in HEADS:
-        path = folder / head / "sensor.toml"
-        text = re.sub(r"(?m)^limb_height\w*km = (\[[^\n]*\]|[^\n]*)\n", "", path.read_text())
-        assert "[body]" in text, text
-        lines = "limb_height_km = 15.0\nlimb_height_sigma_km = 10.0\n" + (TOLD if latitudes else "")
-        path.write_text(text.replace("[body]\n", "[body]\n" + lines))
-
-
-def write_rig(folder, heads, name="used.toml", keys="", mounts=None):
-    """Writes a rig.toml with some heads of the scene's own, and with other told mounts of some of them."""
-    blocks = (folder / "rig.toml").read_text().split("[[head]]")[1:]
-    named = {re.search(r'name = "(\w+)"', block)[1]: block for block in blocks}
-    text = "[rig]\n" + keys
-    for head in heads:
-        block = named[head]
-        if mounts and head in mounts:
-            numbers = ", ".join(repr(float(x)) for x in mounts[head])
-            block = re.sub(r"q_rig_from_camera_wxyz = \[[^\]]*\]", f"q_rig_from_camera_wxyz = [{numbers}]", block)
-        text += "\n[[head]]" + block
-    (folder / name).write_text(text)
-    return folder / name
-
-
-def told_mount(folder, head):
-    block = next(b for b in (folder / "rig.toml").read_text().split("[[head]]") if f'name = "{head}"' in b)
-    inner = re.search(r"q_rig_from_camera_wxyz = \[([^\]]*)\]", block)[1]
-    return np.array([float(x) for x in inner.split(",") if x.strip()])
-
-
-def turned(q, axis, angle_deg):
-    """Returns the mount that is turned about an axis of the camera."""
-    half = math.radians(angle_deg) / 2
-    w, v = math.cos(half), math.sin(half) * np.asarray(axis, float) / np.linalg.norm(axis)
-    scalar, vector = q[0], q[1:]
-    return np.concatenate([[scalar * w - vector @ v], scalar * v + w * vector + np.cross(vector, v)])
-
-
-def run(program, folder, rig):
-    """Runs a rig. Returns the rows of the joint answers and those of each head."""
-    out = folder / f"{rig.stem}.csv"
-    hzn(program, "run", rig, "-o", out, "--force", "-q", "-j", 1)
-    with out.open() as file:
-        rows = list(csv.DictReader(file))
-    out.unlink()
-    return [row for row in rows if row["head"] == "rig"], [row for row in rows if row["head"] != "rig"]
-
-
-def truths(folder):
-    with (folder / "truth.csv").open() as file:
-        return {row["file"]: row for row in csv.DictReader(file)}
-
-
-def miss(row, truth):
-    """Returns the error in degrees and the squared error over the covariance."""
-    answer = np.array([float(row[f"axis_{k}"]) for k in "xyz"])
-    axis = np.array([float(truth[f"axis_{k}"]) for k in "xyz"])
-    covariance = np.array([[float(row["cov_" + "".join(sorted(a + b))]) for b in "xyz"] for a in "xyz"])
-    values, vectors = np.linalg.eigh(covariance)
-    squared = ((vectors[:, 1:].T @ (axis - answer)) ** 2 / values[1:]).sum()
-    return math.degrees(math.atan2(np.linalg.norm(np.cross(axis, answer)), axis @ answer)), squared
-
-
-def by_time(truth, row):
-    return min(truth.values(), key=lambda t: abs(float(t["time_s"]) - float(row["time_s"])))
-
-
-class Count:
-    """Errors and verdicts of joint answers."""
-
-    def __init__(self):
-        self.errors, self.squared, self.protection, self.beyond = [], [], [], 0
-        self.epochs = self.inconsistent = self.excluded = self.silent = 0
-
-    def add(self, row, truth):
-        self.epochs += 1
-        self.excluded += bool(row["heads_excluded"])
-        if row["status"] != "ok":
-            is_inconsistent = row["detail"].startswith("inconsistent")
-            self.inconsistent += is_inconsistent
-            self.silent += not is_inconsistent
-            return
-        error, squared = miss(row, truth)
-        self.errors.append(error)
-        self.squared.append(squared)
-        if row["protection_deg"]:
-            self.protection.append(float(row["protection_deg"]))
-            self.beyond += error > self.protection[-1]
-
-    def merge(self, other):
-        for key, value in vars(other).items():
-            setattr(self, key, getattr(self, key) + value)
-        return self
-
-    def line(self, name):
-        errors = np.array(self.errors or [math.nan])
-        protection = np.median(self.protection) if self.protection else math.nan
-        alarms = self.inconsistent + self.excluded
-        rms = np.sqrt((errors**2).mean())
-        return (f"| {name} | {self.epochs} | {len(self.errors)} | {rms:.4f} | {errors.max():.3f} "
-                f"| {np.mean(self.squared or [math.nan]):.2f} | {protection:.3f} | {self.beyond} | {alarms} |")
-
-
-HEAD = ("| rig | epochs | answers | RMS, deg | worst | NEES | protection, median | beyond | alarms |\n"
-        "|---|---:|---:|---:|---:|---:|---:|---:|---:|")
+AZIMUTHS_DEG = {"four": [0, 90, 180, 270], "two opposite": [0, 180], "two adjacent": [0, 90], "one": [0]}
 
 
 def accuracy_of(program, root, seed, frames):
@@ -172,63 +51,12 @@ def accuracy_of(program, root, seed, frames):
                 for keys, how in (("", ""), ("limb_tilt_sigma_km = 0.0\n", ", tilt told")):
                     if how and not told:
                         continue
-                    joint, _ = run(program, folder, write_rig(folder, heads, keys=keys))
+                    joint, own = run(program, folder, write_rig(folder, heads, keys=keys))
                     count = counts.setdefault((weather, told, f"{name}{how}"), Count())
+                    count.edges += [float(row["rms_px"]) for row in own if row["status"] == "ok"]
                     for row in joint:
                         count.add(row, by_time(truth, row))
         shutil.rmtree(folder)
-    return counts
-
-
-# A fault of one head: the axis of the camera that its mount turns about, or what is done with its pictures.
-TURNS = {"across its limb": [1, 0, 0], "about its axis": [0, 0, 1], "sideways": [0, 1, 0]}
-SIZES_DEG = [0.1, 0.2, 0.3, 0.4, 0.6, 1.0, 2.0]
-
-
-def faults_of(program, root, seed, frames):
-    folder = root / f"ring-{seed}"
-    simulate(program, folder, "ring", seed, frames)
-    truth = truths(folder)
-    counts = {}
-    sets = {"four": HEADS, "three": HEADS[:3], "two opposite": ["front", "back"], "two adjacent": ["front", "right"]}
-    told = (seed % 2) == 0
-    tell_limb(folder, told)
-
-    def tally(name, size, set_name, joint, wrong, epochs=None):
-        count = counts.setdefault((name, size, set_name), [Count(), 0, 0, 0])
-        for number, row in enumerate(joint):
-            if epochs is not None and number not in epochs:
-                continue
-            count[0].add(row, by_time(truth, row))
-            excluded = row["heads_excluded"].split()
-            noticed = bool(excluded) or row["detail"].startswith("inconsistent")
-            count[1] += noticed
-            count[2] += excluded == [wrong]
-            count[3] += bool(excluded) and excluded != [wrong]
-
-    for set_name, heads in sets.items():
-        wrong = heads[seed % len(heads)]
-        joint, _ = run(program, folder, write_rig(folder, heads))
-        tally("none", 0.0, set_name, joint, "")
-        for turn, axis in TURNS.items():
-            for size in SIZES_DEG:
-                mount = turned(told_mount(folder, wrong), axis, size if seed % 4 < 2 else -size)
-                joint, _ = run(program, folder, write_rig(folder, heads, mounts={wrong: mount}))
-                tally(turn, size, set_name, joint, wrong)
-    # The other faults are in the pictures of one head.
-    wrong = HEADS[seed % 4]
-    pictures = sorted((folder / wrong).glob("*.png"))
-    kept = [path.read_bytes() for path in pictures]
-    for number in range(1, len(pictures), 2):
-        pictures[number].write_bytes(kept[number - 1])
-    joint, _ = run(program, folder, write_rig(folder, HEADS))
-    tally("frozen", 0.0, "four", joint, wrong, set(range(1, len(pictures), 2)))
-    for number in range(0, len(pictures) - 1, 2):
-        pictures[number].write_bytes(kept[number + 1])
-        pictures[number + 1].write_bytes(kept[number])
-    joint, _ = run(program, folder, write_rig(folder, HEADS))
-    tally("picture of another epoch", 0.0, "four", joint, wrong)
-    shutil.rmtree(folder)
     return counts
 
 
@@ -380,11 +208,7 @@ def merge(results):
     total = {}
     for counts in results:
         for key, count in counts.items():
-            if isinstance(count, Count):
-                total.setdefault(key, Count()).merge(count)
-            else:
-                sums = total.setdefault(key, [Count(), 0, 0, 0])
-                total[key] = [sums[0].merge(count[0])] + [a + b for a, b in zip(sums[1:], count[1:])]
+            total[key] = total[key].merge(count) if key in total else count
     return total
 
 
@@ -403,23 +227,30 @@ def main():
         print(f"{args.flights} flights of {args.frames} epochs, seeds from {args.first_seed}\n")
         show(results)
         return
-    total = merge(fly(args, {"accuracy": accuracy_of, "faults": faults_of, "pair": pair_of}[args.what]))
+    if args.what == "faults":
+        import rig_faults
+
+        total = merge(fly(args, rig_faults.faults_of))
+    else:
+        total = merge(fly(args, {"accuracy": accuracy_of, "pair": pair_of}[args.what]))
     print(f"{args.flights} flights of {args.frames} epochs, seeds from {args.first_seed}\n")
     if args.what == "faults":
-        print("| fault of one head | size, deg | heads | epochs | noticed | right head excluded | wrong head excluded "
-              "| protection, median | beyond |\n|---|---:|---|---:|---:|---:|---:|---:|---:|")
-        for (name, size, heads), (count, noticed, right, wrong) in sorted(total.items(), key=lambda t: (t[0][2], t[0])):
-            share = [f"{100 * n / count.epochs:.1f} %" for n in (noticed, right, wrong)]
-            protection = f"{np.median(count.protection):.3f}" if count.protection else "-"
-            cells = [name, size, heads, count.epochs, *share, protection, count.beyond]
-            print(f"| {' | '.join(map(str, cells))} |")
+        print(rig_faults.HEAD)
+        for key, tally in sorted(total.items(), key=lambda t: (t[0][2], t[0])):
+            print(tally.line(*key))
         return
-    print(HEAD)
+    first, second = COUNT_HEAD.split("\n")
+    print(f"{first} bound, deg | RMS over bound |\n{second}---:|---:|" if args.what == "accuracy" else COUNT_HEAD)
     for key, count in total.items():
         name = key
         if args.what == "accuracy":
             weather, told, heads = key
             name = f"{heads}; {'latitude told' if told else 'not told'}{'; weather' if weather else ''}"
+            azimuths = AZIMUTHS_DEG[heads.split(",")[0]]
+            bound = rig_design.bound_deg(azimuths, np.median(count.edges), 1.5 if weather else 0.0)
+            # Without the change with latitude there is a tilt of the limb, which no estimate can find.
+            print(f"{count.line(name)} {bound:.4f} | {count.rms_deg() / bound:.2f} |" if told else f"{count.line(name)} - | - |")
+            continue
         print(count.line(name))
 
 

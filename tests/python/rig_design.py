@@ -61,6 +61,32 @@ def rms_deg(azimuths_deg, altitude_km=500.0, field_of_view_deg=60.0, mount_deg=0
     return math.degrees(math.sqrt(np.trace(covariance) + 2 * (tilt_km * by_km) ** 2))
 
 
+def bound_deg(azimuths_deg, sigma_px, weather_km=0.0, length_km=1000.0, correlation_px=2.0, points=100):
+    """Returns the smallest error that an unbiased estimate can have at 500 km: the Cramer-Rao bound of axis and height.
+
+    The common height is known to 10 km. The weather of the limb is a random field with a Gaussian correlation, whose
+    covariance the estimate knows for all pairs of edge points of all heads.
+    """
+    alpha, radius = half_angle(500.0), RADIUS_KM
+    by_km, half = math.tan(alpha) / radius, arc(alpha, 60.0)
+    psi = np.concatenate([math.radians(azimuth) + np.linspace(-half, half, points) for azimuth in azimuths_deg])
+    head = np.repeat(np.arange(len(azimuths_deg)), points)
+    rows = np.column_stack([np.cos(psi), np.sin(psi), np.full(psi.size, by_km)])
+    # A point stands for POINTS / points neighbours.
+    step_px = POINTS / points
+    along = np.abs(np.subtract.outer(*[np.arange(psi.size)] * 2)) * step_px
+    share = (1.0 + 2.0 * sum(math.exp(-k / correlation_px) for k in range(1, POINTS))) / step_px
+    near = np.exp(-along / correlation_px) if correlation_px > step_px else np.eye(psi.size) * max(share, 1.0 / step_px)
+    noise = (sigma_px / FOCAL_PX) ** 2 * near * (head[:, None] == head)
+    # The limb is a circle with the radius of the body times the cosine of the half-angle.
+    circle = radius * math.cos(alpha) * np.column_stack([np.cos(psi), np.sin(psi)])
+    apart = np.linalg.norm(circle[:, None] - circle, axis=2)
+    noise = noise + (by_km * weather_km) ** 2 * np.exp(-0.5 * (apart / length_km) ** 2)
+    information = rows.T @ np.linalg.solve(noise + 1e-18 * np.eye(psi.size), rows)
+    information[2, 2] += 1.0 / 10.0**2
+    return math.degrees(math.sqrt(np.trace(np.linalg.inv(information)[:2, :2])))
+
+
 def table(title, columns):
     print(f"| {title} | " + " | ".join(name for name, _ in columns) + " |\n|---|" + "---:|" * len(columns))
     for name, azimuths in RIGS:
