@@ -66,8 +66,9 @@ impl core::fmt::Display for Refused {
 }
 impl core::error::Error for Refused {}
 
-/// Largest `limits.max_work` of a flight computer: four times the default. A unit costs at most 80 instructions, so a
-/// picture ends after 79 million instructions, which is 0.2 s on a processor with 400 million instructions a second.
+/// Largest `limits.max_work` of a flight computer: four times the default. The most expensive unit found costs 81
+/// instructions, so a picture ends after 80 million, which is 0.2 s on a processor with 400 million instructions a
+/// second.
 /// Otherwise the watchdog could reset the computer in every picture.
 pub const MAX_WORK: u32 = 983_040;
 const WORK: u16 = 120;
