@@ -66,6 +66,7 @@ pub(crate) fn sequences() -> Vec<Sequence> {
     let kinds = [("1920×1080 clean", true), ("1920×1080 cloudy", false)];
     let mut sequences: Vec<Sequence> = kinds.map(|(name, clean)| sequence(name, clean)).into();
     sequences.extend(hostile_sequence(&sequences));
+    sequences.push(hostile_moon_sequence());
     sequences
 }
 
@@ -93,6 +94,16 @@ fn hostile_sequence(sequences: &[Sequence]) -> Option<Sequence> {
     let hostile = paint_expensive_pictures(24..36, &usual_sensors());
     let pictures = hostile.into_iter().flat_map(|case| [limb.clone(), case.bytes]).collect();
     Some(Sequence { name: "1920×1080, a limb and a hostile picture in turn", sensor: sensor.clone(), pictures })
+}
+
+/// Returns the most expensive pictures of a sensor for the Moon, with the Moon before each.
+fn hostile_moon_sequence() -> Sequence {
+    let Case { mut sensor, bytes: shown, .. } = moon_at_the_bottom();
+    sensor.track.full_every = 1000;
+    // The most expensive one of the table is among them.
+    let hostile = paint_expensive_pictures(52..58, &moon());
+    let pictures = hostile.into_iter().flat_map(|case| [shown.clone(), case.bytes]).collect();
+    Sequence { name: "1920×1080, the Moon and a hostile picture in turn", sensor, pictures }
 }
 
 /// Returns frames of a rocket's flight, clean or cloudy.

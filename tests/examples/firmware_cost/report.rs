@@ -248,14 +248,16 @@ pub(crate) fn read_figures(text: &str) -> Vec<(String, f64)> {
         if columns.is_empty() {
             columns = values.to_vec();
         }
-        // Of the worst pictures only the first counts, because another one may become the worst.
+        // Of the worst pictures only the most expensive one counts, because another one may become the worst.
         let name = name.split(": ").next().unwrap_or(name);
         for (value, column) in values.iter().zip(&columns) {
             let key = format!("{heading}, {name}, {column}");
             // Only the total of a picture is compared; its work and its stages are for information.
             let read_only = *column == "work, thousand" || Stage::ALL.iter().any(|s| s.name() == *column);
-            if let (Ok(n), false) = (value.parse(), read_only || out.iter().any(|(k, _)| *k == key)) {
-                out.push((key, n));
+            let Some(n) = value.parse::<f64>().ok().filter(|_| !read_only) else { continue };
+            match out.iter_mut().find(|(k, _)| *k == key) {
+                Some((_, most)) => *most = most.max(n),
+                None => out.push((key, n)),
             }
         }
     }

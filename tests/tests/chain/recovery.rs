@@ -76,7 +76,7 @@ fn a_bad_parameter_in_memory_heals_itself() {
     bench.write_copy_of(1, &parameters, 1);
     parameters.sensor.limits.max_work = Some(hzn_flight::parameters::MAX_WORK);
     bench.write_copy_of(2, &parameters, 2);
-    // The watchdog's two seconds are 31 million instructions at this shift: twice the default `limits.max_work`.
+    // The watchdog has 31 million instructions here; the default `limits.max_work` takes at most 20 million.
     assert_eq!(bench.run_with_shift(&shut_down_after_starts(&bench), 6), 0);
     let printed = hzn_run(bench.dir(), &["telemetry", "sent.bin", "-o", "sent.csv"]);
     assert_eq!(printed.matches("started with copy 2 of the parameters").count(), 3, "{printed}");
