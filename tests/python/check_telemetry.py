@@ -19,25 +19,7 @@ import numpy as np
 import space_packet_parser as spp
 from space_packet_parser.xtce.validation import validate_xtce
 from spacepackets.ccsds.spacepacket import PacketType, SpacePacketHeader
-
-MARKER = bytes.fromhex("1acffc1d")
-
-
-def is_same(decoded: float, written: float | None) -> bool:
-    """Return whether a number is the one that was written; None stands for NaN and infinity."""
-    return not math.isfinite(decoded) if written is None else float(decoded) == written
-
-
-def without_markers(stream: bytes) -> tuple[bytes, list[int]]:
-    """Return the packets one after another, and their APIDs."""
-    packets, apids, at = bytearray(), [], 0
-    while at < len(stream):
-        assert stream[at : at + 4] == MARKER, at
-        end = at + 4 + 6 + int.from_bytes(stream[at + 8 : at + 10], "big") + 1
-        packets += stream[at + 4 : end]
-        apids.append(int.from_bytes(stream[at + 4 : at + 6], "big") & 0x7FF)
-        at = end
-    return bytes(packets), apids
+from telecommands import COMMANDS, MADE_BY_LOAD, bytes_of_hzn, is_same, without_markers
 
 
 def check_xtce(dictionary: Path, packets: Path, lines: list[dict]) -> int:
@@ -127,27 +109,6 @@ def check_ccsdspy(folder: Path, packets: bytes, lines: list[dict]) -> int:
 
 
 XTCE = "{http://www.omg.org/spec/XTCE/20180204}"
-TIME_OF_TEST = "2026-11-24T12:00:00Z"
-# The words of `hzn telecommand`, and the same values as arguments of the dictionary, in their order. 2174212837 is the
-# time of the test in seconds since 1958, TAI.
-COMMANDS = {
-    "mode flight": ["flight"],
-    "set body.altitude_km 231.5": ["body.altitude_km", 231.5],
-    "read gates.max_attitude_sigma": ["gates.max_attitude_sigma"],
-    "process-once": [],
-    "dump-edges": [],
-    "reset-counters": [],
-    "known 231 6608 -20 3.5 0.1 -0.2 0.3": [231e3, 6608e3, -20e3, 3500.0, 0.1, -0.2, 0.3],
-    "try threshold.level 90": ["threshold.level", 90.0],
-    "ping": [],
-    "report": [],
-    "arm": [],
-    "navigate 5 60 NaN 6608 0 0 0 7300 -1": [5_000_000, 60.0, None, 6608e3, 0.0, 0.0, 0.0, 7300.0, -1.0, None, None, None],
-    f"time {TIME_OF_TEST} pulse": [2174212837, 0, "last pulse"],
-    "attitude 5 60 0.6 0 0.8 0 3 0 0 1": [5_000_000, 60.0, 0.6, 0.0, 0.8, 0.0, math.radians(3), 0.0, 0.0, 1.0],
-}
-# These two are made by `load`, which sends more than one packet.
-MADE_BY_LOAD = {"stage", "commit"}
 
 
 def encode(meta: ElementTree.Element, types: dict[str, ElementTree.Element], values: list) -> bytes:
@@ -183,20 +144,20 @@ def check_commands(hzn: str, dictionary: Path, folder: Path) -> int:
     root = ElementTree.parse(dictionary).getroot()
     types = {kind.get("name"): kind for kind in root.find(f"{XTCE}CommandMetaData/{XTCE}ArgumentTypeSet")}
     metas = {meta.get("name"): meta for meta in root.iter(f"{XTCE}MetaCommand")}
+    containers = {container.get("name"): container for container in root.iter(f"{XTCE}SequenceContainer")}
     assert {words.split()[0] for words in COMMANDS} | MADE_BY_LOAD == set(metas)
     for words, values in COMMANDS.items():
-        file = folder / "command.bin"
-        subprocess.run([hzn, "telecommand", words, "-o", file, "--force"], check=True, capture_output=True)
-        sent = file.read_bytes()
+        sent = bytes_of_hzn(hzn, words, folder / "command.bin")
         encoded = encode(metas[words.split()[0]], types, values)
-        assert sent[:4] == MARKER and sent[4:-2] == encoded, (words, sent.hex(), encoded.hex())
+        assert sent[:-2] == encoded, (words, sent.hex(), encoded.hex())
         header = SpacePacketHeader.unpack(encoded)
         assert header.packet_type == PacketType.TC and header.packet_len == len(encoded) + 2, words
         # A command is done, or refused, when its acknowledgement says so.
         verifiers = metas[words.split()[0]].find(f"{XTCE}VerifierSet")
         for verifier in ("CompleteVerifier", "FailedVerifier"):
-            function = verifiers.find(f"{XTCE}{verifier}/{XTCE}ComparisonList/{XTCE}Comparison")
-            assert (function.get("parameterRef"), int(function.get("value"))) == ("acknowledgement_function", encoded[14])
+            answer = containers[verifiers.find(f"{XTCE}{verifier}/{XTCE}ContainerRef").get("containerRef")]
+            compared = {item.get("parameterRef"): item.get("value") for item in answer.iter(f"{XTCE}Comparison")}
+            assert compared == {"acknowledgement_function": str(encoded[14]), "acknowledgement_code": "0"}, words
     return len(metas)
 
 

@@ -11,7 +11,7 @@ use hzn_flight::messages::{Code, Event, Mode, Severity};
 use hzn_flight::packet::{Apid, ApidBase};
 use hzn_flight::record::{Field, Kind};
 
-use crate::xtce_commands::command_meta_data;
+use crate::xtce_commands::{answers, command_meta_data};
 use crate::xtce_text::{enumeration_list, escape, plain, type_name, unit_of, unit_set};
 
 /// The fields before the user data, with their bits.
@@ -238,12 +238,21 @@ impl Dictionary {
     }
 }
 
+/// Returns what makes a container a kind of another one.
+fn part_of(base: &str, comparisons: &str) -> String {
+    format!(
+        "\n        <BaseContainer containerRef=\"{base}\"><RestrictionCriteria>{comparisons}\
+         </RestrictionCriteria></BaseContainer>"
+    )
+}
+
 /// Returns the dictionary of a computer with these APIDs. The packets are those between the sync markers of the line.
 pub fn dictionary(base: ApidBase) -> String {
     let mut d = Dictionary::default();
     for (name, bits, description) in HEADERS.into_iter().chain([CHECKSUM]) {
         let ty = match name {
-            "time_seconds" => d.time(name, bits, 1.0, "<Epoch>1958-01-01</Epoch>"),
+            // The name, not the date 1958-01-01: a date does not say that leap seconds count.
+            "time_seconds" => d.time(name, bits, 1.0, "<Epoch>TAI</Epoch>"),
             "time_fraction" => d.time(name, bits, 2f64.powi(-24), "<OffsetFrom parameterRef=\"time_seconds\"/>"),
             _ => d.integer(bits, ""),
         };
@@ -254,13 +263,14 @@ pub fn dictionary(base: ApidBase) -> String {
         let numbers = d.numbers(apid);
         numbers.iter().for_each(|number| d.add_parameter(number));
         let entries: Vec<&str> = numbers.iter().map(|n| n.name.as_str()).chain([CHECKSUM.0]).collect();
-        let base = format!(
-            "\n        <BaseContainer containerRef=\"CCSDSPacket\"><RestrictionCriteria>\
-             <Comparison parameterRef=\"packet_apid\" value=\"{}\" useCalibratedValue=\"false\"/>\
-             </RestrictionCriteria></BaseContainer>",
+        let number = format!(
+            "<Comparison parameterRef=\"packet_apid\" value=\"{}\" useCalibratedValue=\"false\"/>",
             base.apid(apid)
         );
-        d.add_container(apid.name(), false, &entries, &base);
+        d.add_container(apid.name(), false, &entries, &part_of("CCSDSPacket", &number));
+    }
+    for (name, comparisons) in answers() {
+        d.add_container(&name, false, &[], &part_of(Apid::Acknowledge.name(), &comparisons));
     }
     let types: String = d.types.values().map(|ty| format!("      {ty}\n")).collect();
     format!(

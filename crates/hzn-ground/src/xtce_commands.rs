@@ -225,25 +225,43 @@ fn header(user_bytes: usize, base: ApidBase) -> String {
         + &fixed("packet_time", &[0; 8])
 }
 
-/// Returns the verifiers of a telecommand: its acknowledgement, with the code 0 or another one.
-fn verifiers(function: Function) -> String {
-    let verifier = |element: &str, code: &str| {
+/// The two answers to a telecommand: the name of the verifier, its element, and how the code compares with 0.
+const ANSWERS: [(&str, &str, &str); 2] = [("done", "CompleteVerifier", "=="), ("refused", "FailedVerifier", "!=")];
+
+/// Returns the name of the acknowledgement with this answer.
+fn answer_name(function: Function, answer: &str) -> String {
+    format!("{}_{answer}", function.name())
+}
+
+/// Returns the acknowledgements that the verifiers wait for: a name, and the comparisons that choose the packet.
+///
+/// A verifier that compares the parameters itself would also take an older acknowledgement, whose values a ground system
+/// keeps. A container is a packet that arrives.
+pub(crate) fn answers() -> impl Iterator<Item = (String, String)> {
+    let choose = |function: Function, operator: &str| {
         format!(
-            "          <{element} name=\"{}\">\n            <ComparisonList>\n\
-             \x20             <Comparison parameterRef=\"acknowledgement_function\" value=\"{}\"/>\n\
-             \x20             <Comparison parameterRef=\"acknowledgement_code\" {code} value=\"0\" \
-             useCalibratedValue=\"false\"/>\n            </ComparisonList>\n\
-             \x20           <CheckWindow timeToStopChecking=\"{WAIT}\" timeWindowIsRelativeTo=\"commandRelease\"/>\n\
-             \x20         </{element}>\n",
-            if element == "CompleteVerifier" { "done" } else { "refused" },
+            "<ComparisonList><Comparison parameterRef=\"acknowledgement_function\" value=\"{}\"/>\
+             <Comparison parameterRef=\"acknowledgement_code\" comparisonOperator=\"{operator}\" value=\"0\" \
+             useCalibratedValue=\"false\"/></ComparisonList>",
             function as u8
         )
     };
-    format!(
-        "        <VerifierSet>\n{}{}        </VerifierSet>",
-        verifier("CompleteVerifier", "comparisonOperator=\"==\""),
-        verifier("FailedVerifier", "comparisonOperator=\"!=\"")
-    )
+    Function::ALL.iter().flat_map(move |&function| {
+        ANSWERS.map(|(answer, _, operator)| (answer_name(function, answer), choose(function, operator)))
+    })
+}
+
+/// Returns the verifiers of a telecommand: its acknowledgement, with the code 0 or another one.
+fn verifiers(function: Function) -> String {
+    let verifier = |(name, element, _): (&str, &str, &str)| {
+        format!(
+            "          <{element} name=\"{name}\">\n            <ContainerRef containerRef=\"{}\"/>\n\
+             \x20           <CheckWindow timeToStopChecking=\"{WAIT}\" timeWindowIsRelativeTo=\"commandRelease\"/>\n\
+             \x20         </{element}>\n",
+            answer_name(function, name)
+        )
+    };
+    format!("        <VerifierSet>\n{}        </VerifierSet>", ANSWERS.map(verifier).concat())
 }
 
 /// Returns the telecommands of a computer with these APIDs.

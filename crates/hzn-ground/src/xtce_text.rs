@@ -1,7 +1,7 @@
 //! Pieces of XTCE that telemetry and telecommands share.
 
 /// Endings of names, with their units.
-const UNITS: [(&str, &str); 11] = [
+const UNITS: [(&str, &str); 13] = [
     ("_rad_s", "rad/s"),
     ("_m_s", "m/s"),
     ("_us", "us"),
@@ -13,6 +13,8 @@ const UNITS: [(&str, &str); 11] = [
     ("_rad", "rad"),
     ("cov", "rad2"),
     ("cov_free", "rad2"),
+    ("cov_common", "rad2"),
+    ("_bytes", "bytes"),
 ];
 
 /// Returns the unit of a field.
