@@ -28,6 +28,7 @@ mod dist;
 mod firmware;
 mod first_command;
 mod flight_build;
+mod ground;
 mod machine;
 mod miri;
 mod mutants;
