@@ -2,9 +2,10 @@
 
     python tests/python/line_coverage.py --page book/results/assurance.md
 
-The workspace is built with counters of LLVM in a folder of its own, and `cargo test` runs on it. A nightly toolchain
-counts branches, too; without one the column is empty. Files of tests do not count, nor do modules named `tests`: a
-test always runs its own lines. What runs only on the flight computer, in Python or in the browser is not seen here.
+The workspace is built with counters of LLVM in a folder of its own, and `cargo test` runs on it. The packages of others
+have no counters. A nightly toolchain counts branches, too; without one the column is empty. Files of tests do not
+count, nor do modules named `tests`: a test always runs its own lines. What runs only on the flight computer, in Python
+or in the browser is not seen here.
 """
 
 import argparse
@@ -47,17 +48,22 @@ def measure(args):
     """Builds and runs the tests. Returns the program files and the counts."""
     name, tools, branches = toolchain()
     flags = "-Cinstrument-coverage" + (" -Zcoverage-options=branch" if branches else "")
+    wrapper = args.folder / "rustc_with_counters"
+    wrapper.write_text(f'#!/bin/sh\nexec "$@" {flags}\n')
+    wrapper.chmod(0o755)
     profiles = args.folder / "profiles"
     shutil.rmtree(profiles, ignore_errors=True)
-    environment = os.environ | {"CARGO_TARGET_DIR": str(args.folder), "RUSTFLAGS": flags, "CARGO_INCREMENTAL": "0",
-                                "LLVM_PROFILE_FILE": str(profiles / "%m_%p.profraw")}
-    cargo = ["rustup", "run", name, "cargo", "test", "--locked"]
+    environment = os.environ | {"CARGO_TARGET_DIR": str(args.folder), "RUSTC_WORKSPACE_WRAPPER": str(wrapper),
+                                "CARGO_INCREMENTAL": "0",
+                                # A few files for each program, in which its runs are added up.
+                                "LLVM_PROFILE_FILE": str(profiles / "%4m.profraw")}
+    cargo = ["rustup", "run", name, "cargo", "test", "--locked", "--lib", "--bins", "--tests"]
     built = run([*cargo, "--no-run", "--message-format=json"], cwd=ROOT, env=environment)
     messages = [json.loads(line) for line in built.splitlines() if line.startswith("{")]
     programs = sorted({one["executable"] for one in messages if one.get("executable")})
     shutil.rmtree(profiles, ignore_errors=True)  # programs that ran while others were built
-    done = subprocess.run([*cargo, "--no-fail-fast", "--lib", "--bins", "--tests"], cwd=ROOT, env=environment,
-                          capture_output=True, text=True, check=False)
+    done = subprocess.run([*cargo, "--no-fail-fast"], cwd=ROOT, env=environment, capture_output=True, text=True,
+                          check=False)
     failed = re.findall(r"^test (\S+) \.\.\. FAILED", done.stdout, re.MULTILINE)
     passed = len(re.findall(r"^test .* \.\.\. ok$", done.stdout, re.MULTILINE))
     raw = args.folder / "profiles.txt"
