@@ -206,6 +206,7 @@ impl Position {
             var_cos: self.cos_free_variance.into(),
             axis_with_cos: None,
             cos_per_px: self.cos_free_per_px.into(),
+            common: None,
         })
     }
 }

@@ -63,6 +63,7 @@ fn see(rng: &mut Draws, mount: &Rotation3<f64>, e: &Vector3<f64>, cos: f64) -> F
         var_cos: covariance.m33,
         axis_with_cos: Some(with_cos.into()),
         cos_per_px: 1e-3,
+        common: None,
     }
 }
 

@@ -41,6 +41,7 @@ mod rerun;
 mod resume;
 mod rewritten;
 mod rig;
+mod rig_answers;
 mod rig_campaign;
 mod rig_mounts;
 mod rig_resume;

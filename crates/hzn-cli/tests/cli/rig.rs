@@ -4,12 +4,12 @@ use std::fs;
 
 use crate::common::{Place, cell, without_time};
 
-type Rows = Vec<Vec<(String, String)>>;
+pub(crate) type Rows = Vec<Vec<(String, String)>>;
 
 const HEADS: [&str; 4] = ["front", "right", "back", "left"];
 
 /// Simulates four epochs of the scene `ring` with small pictures.
-fn ring() -> Place {
+pub(crate) fn ring() -> Place {
     let place = Place::new();
     let scene = place.run(&["simulate", "ring", "--show"]).expect(0).out;
     let scene = scene.replace("width = 640\nheight = 480", "width = 320\nheight = 240").replace("554.0", "277.0");
@@ -19,7 +19,7 @@ fn ring() -> Place {
 }
 
 /// Runs the rig. Returns the rows of the joint answers, and those of the heads.
-fn run(place: &Place, args: &[&str], code: i32) -> (Rows, Rows) {
+pub(crate) fn run(place: &Place, args: &[&str], code: i32) -> (Rows, Rows) {
     let out = place.run(&[&["run", "ring/rig.toml", "-q"], args].concat()).expect(code).out;
     without_time(&out).into_iter().partition(|row| cell(row, "head") == "rig")
 }

@@ -180,6 +180,20 @@ pub struct Free<T> {
     /// Change of `cos` when every edge point moves by one pixel across the limb, 1/px: the weighted RMS of
     /// |∂(s·e)/∂(u, v)| over the points with a weight in the fit.
     pub cos_per_px: T,
+    /// The part of this covariance whose error is the same in the next picture, as [`Solution::common`] is that of the
+    /// answer. `None` if the method does not know the part (`braun-barf`), or when the answer came by telemetry.
+    pub common: Option<FreeCommon<T>>,
+}
+
+/// The part of the covariance of a freely fitted cone ([`Free`]) whose error is the same in the next picture.
+#[derive(Debug, Clone, Copy)]
+pub struct FreeCommon<T> {
+    /// Covariance of the axis in the camera frame, rad².
+    pub covariance: Cov3<Cam, T>,
+    /// Variance of the cosine of the half-angle.
+    pub var_cos: T,
+    /// Covariance of the axis with the cosine in the camera frame, rad.
+    pub axis_with_cos: [T; 3],
 }
 
 /// The position of a body's centre, from the limb alone or with a known distance.

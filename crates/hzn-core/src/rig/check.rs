@@ -3,6 +3,7 @@
 use super::head::Head;
 use super::joint::{Cone, Joint, NoJoint, axis_sigma, chosen, invert};
 use crate::base::error::{ConfigError, Limit};
+use crate::base::linalg::M3;
 use crate::base::real::Real;
 use crate::geometry::frames::{Cov3, UnitVec3};
 
@@ -73,9 +74,13 @@ impl<T: Real> Rig<T> {
         let var_tilt = tilt_rad * tilt_rad;
         let p = &cone.covariance;
         let excluded = all & !set;
+        // A tilt of the limb is common, as a whole.
+        let of_axis =
+            |p: &M3<T>| Cov3::from_tangent(&cone.b[0], &cone.b[1], [p.m11 + var_tilt, p.m12, p.m22 + var_tilt]);
         Ok(Joint {
             axis: UnitVec3::assume_unit(cone.e),
-            covariance: Cov3::from_tangent(&cone.b[0], &cone.b[1], [p.m11 + var_tilt, p.m12, p.m22 + var_tilt]),
+            covariance: of_axis(p),
+            common: cone.common(heads, set).as_ref().map(of_axis),
             cos: (cone.c, p.m33.max(T::ZERO).sqrt()),
             heads_used: set,
             heads_excluded: excluded,

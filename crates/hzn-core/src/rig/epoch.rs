@@ -1,9 +1,9 @@
 //! The answers of the heads at one epoch, joined in the axes of the vehicle.
 
 use super::check::{MOST_HEADS, Rig};
-use super::head::{Head, symmetric};
+use super::head::{Head, symmetric, upper};
 use super::joint::{Joint, NoJoint};
-use super::mount::{Mount, upper};
+use super::mount::Mount;
 use super::weather::Limb;
 use crate::base::linalg::M3;
 use crate::base::real::Real;
@@ -54,7 +54,10 @@ pub struct EpochAnswer<T> {
     pub axis: UnitVec3<Vehicle, T>,
     /// Covariance of `axis`, rad², rank 2.
     pub covariance: Cov3<Vehicle, T>,
-    /// The part of `covariance` that the next epoch shares; `None` if it is not known.
+    /// The part of `covariance` whose error is the same in the next epoch while the geometry stays, rad², rank 2:
+    /// the common part of each head's free fit, the weather of the limb, the mounts, the tilt of the limb, and the
+    /// attitude of the rig. A mean of n such answers has the covariance common + (covariance − common)/n. `None` if it
+    /// is not known of a head.
     pub common: Option<Cov3<Vehicle, T>>,
     /// Half-angle of the limb, rad.
     pub half_angle_rad: T,
@@ -108,7 +111,7 @@ impl<T: Real> Rig<T> {
         let answer = EpochAnswer {
             axis: joint.axis,
             covariance: joint.covariance,
-            common: None,
+            common: joint.common,
             half_angle_rad: (T::one() - cos * cos).max(T::ZERO).sqrt().atan2(cos),
             cos_sigma: Some(joint.cos.1),
             heads_used: joint.heads_used,
@@ -134,8 +137,8 @@ impl<T: Real> Rig<T> {
             return (joint, time_s);
         }
         match self.join(&cones(common, heads, joint.heads_used, own_s), tilt_rad) {
-            Ok(Joint { axis, covariance, cos, heads_used, .. }) if heads_used == joint.heads_used => {
-                (Joint { axis, covariance, cos, ..joint }, own_s)
+            Ok(Joint { axis, covariance, common, cos, heads_used, .. }) if heads_used == joint.heads_used => {
+                (Joint { axis, covariance, common, cos, ..joint }, own_s)
             }
             _ => (joint, time_s),
         }

@@ -2,7 +2,7 @@
 
 use crate::base::linalg::{M3, V3, basis, invert_spd3};
 use crate::base::real::Real;
-use crate::geometry::frames::{Cam, Rotation, UnitVec3, Vehicle};
+use crate::geometry::frames::{Cam, Cov3, Rotation, UnitVec3, Vehicle};
 use crate::model::report::Free;
 
 /// The freely fitted cone of one head in the axes of the vehicle, with its information. It is made from the answer of
@@ -16,6 +16,8 @@ pub struct Head<T> {
     /// Covariance of (δ₁, δ₂, δc) and its inverse.
     pub(super) covariance: M3<T>,
     pub(super) information: M3<T>,
+    /// The part of the covariance that the next epoch shares; `None` if it is not known.
+    pub(super) common: Option<M3<T>>,
 }
 
 impl<T: Real> Head<T> {
@@ -25,6 +27,9 @@ impl<T: Real> Head<T> {
     /// the camera about the axes of the vehicle, rad². `own_sigma_cos` is the 1-sigma of the part of the cosine that
     /// this head does not share with the others, such as the weather of its part of the limb. `None` if the cone came
     /// by telemetry, without its correlation, or if its covariance is not positive definite.
+    ///
+    /// The errors of the mount and of that cosine are the same in the next epoch. They belong to the common part of the
+    /// head as a whole.
     pub fn new(
         free: &Free<T>,
         vehicle_from_camera: &Rotation<Cam, Vehicle, T>,
@@ -34,24 +39,23 @@ impl<T: Real> Head<T> {
         let turn = |v: V3<T>| vehicle_from_camera.to_matrix() * v;
         let (c1, c2) = basis(free.axis.v());
         let with_cos = V3::from(free.axis_with_cos?);
-        let form = |a: &V3<T>, p: &M3<T>, b: &V3<T>| a.dot(&(p * b));
-        let axis = symmetric(&free.covariance.upper_rad2);
         let e = *vehicle_from_camera.apply(&free.axis).v();
         let b = [turn(c1), turn(c2)];
         // A rotation θ of the mount moves the axis by θ × e, so that the components are (e × b)·θ.
         let mount = symmetric(mount_rad2);
         let lever = b.map(|b| e.cross(&b));
-        let p11 = form(&c1, &axis, &c1) + form(&lever[0], &mount, &lever[0]);
-        let p12 = form(&c1, &axis, &c2) + form(&lever[0], &mount, &lever[1]);
-        let p22 = form(&c2, &axis, &c2) + form(&lever[1], &mount, &lever[1]);
-        let (p13, p23) = (c1.dot(&with_cos), c2.dot(&with_cos));
-        let p33 = free.var_cos + own_sigma_cos * own_sigma_cos;
+        let added = on_basis(&lever, &mount, &V3::zeros(), own_sigma_cos * own_sigma_cos);
+        let seen = |axis: &Cov3<Cam, T>, with_cos: V3<T>, var_cos: T| {
+            on_basis(&[c1, c2], &symmetric(&axis.upper_rad2), &with_cos, var_cos) + added
+        };
+        let covariance = seen(&free.covariance, with_cos, free.var_cos);
         Some(Self {
             e,
             c: free.cos,
             b,
-            covariance: M3::new(p11, p12, p13, p12, p22, p23, p13, p23, p33),
-            information: invert_spd3(&[p11, p12, p13, p22, p23, p33])?,
+            covariance,
+            information: invert_spd3(&upper(&covariance))?,
+            common: free.common.map(|p| seen(&p.covariance, p.axis_with_cos.into(), p.var_cos)),
         })
     }
 
@@ -61,6 +65,20 @@ impl<T: Real> Head<T> {
     }
 }
 
+/// Returns the covariance of two components of a vector and of a scalar, from the covariance of the vector, its
+/// covariance with the scalar, and the variance of the scalar.
+fn on_basis<T: Real>([a, b]: &[V3<T>; 2], p: &M3<T>, with_scalar: &V3<T>, var_scalar: T) -> M3<T> {
+    let (pa, pb) = (p * a, p * b);
+    let (p11, p12, p22) = (a.dot(&pa), a.dot(&pb), b.dot(&pb));
+    let (p13, p23) = (a.dot(with_scalar), b.dot(with_scalar));
+    M3::new(p11, p12, p13, p12, p22, p23, p13, p23, var_scalar)
+}
+
 pub(super) fn symmetric<T: Real>([xx, xy, xz, yy, yz, zz]: &[T; 6]) -> M3<T> {
     M3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz)
+}
+
+/// Returns the upper triangle of a symmetric matrix.
+pub(super) fn upper<T: Real>(m: &M3<T>) -> [T; 6] {
+    [m.m11, m.m12, m.m13, m.m22, m.m23, m.m33]
 }

@@ -18,6 +18,9 @@ pub struct Joint<T> {
     pub axis: UnitVec3<Vehicle, T>,
     /// Covariance of `axis`, rad², rank 2.
     pub covariance: Cov3<Vehicle, T>,
+    /// The part of `covariance` whose error is the same in the next epoch while the geometry stays, rad², rank 2.
+    /// `None` if it is not known of a head.
+    pub common: Option<Cov3<Vehicle, T>>,
     /// Cosine of the common half-angle, and its 1-sigma.
     pub cos: (T, T),
     /// The heads whose cones are in the answer: bit k for head k.
@@ -81,6 +84,21 @@ impl<T: Real> Cone<T> {
         let (b1, b2) = basis(&e);
         let (normal, _) = equations(heads, used, &e, c, &[b1, b2]);
         Some(Self { e, c, b: [b1, b2], normal, covariance: invert(&normal)? })
+    }
+
+    /// Returns the part of the covariance of the heads in `used` that the next epoch shares; `None` if it is not known
+    /// of a head.
+    ///
+    /// An error x_k of head k moves the cone by A⁻¹ J_kᵀ C_k⁻¹ x_k. While the geometry stays, this gain is the same in
+    /// the next epoch.
+    pub(super) fn common(&self, heads: &[Option<Head<T>>], used: u8) -> Option<M3<T>> {
+        let mut sum = M3::zeros();
+        for (_, head) in chosen(heads, used) {
+            let (j, _) = self.seen_by(head);
+            let gain = self.covariance * j.transpose() * head.information;
+            sum += gain * head.common? * gain.transpose();
+        }
+        Some(sum)
     }
 
     /// Returns the derivative J of what the head sees by (δ₁, δ₂, δc), and the residual r.

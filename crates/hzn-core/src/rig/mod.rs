@@ -15,6 +15,10 @@
 //! r_k = (−B_kᵀ e, c_k − c),   J_k = [[B_kᵀ B, 0], [0, 1]],   A = Σ J_kᵀ C_k⁻¹ J_k,   δ = A⁻¹ Σ J_kᵀ C_k⁻¹ r_k
 //! ```
 //!
+//! The next epoch shares a part of the error of each head: mount, lens, common shift and tilt of its edge, weather of
+//! the limb. With the covariance K_k of this part, the joint answer shares Σ G_k K_k G_kᵀ with the next one, where
+//! G_k = A⁻¹ J_kᵀ C_k⁻¹. A wrong limb height of all heads is in the common cosine, and not in the axis.
+//!
 //! The check compares each head with the solution of the others: q_k = νᵀ (C_k + J_k A₋ₖ⁻¹ J_kᵀ)⁻¹ ν has the χ²
 //! distribution with three degrees of freedom. This is solution separation, as in the integrity monitoring of
 //! navigation receivers (RAIM). A head is excluded only if exactly one exclusion leaves heads that agree; otherwise
@@ -46,6 +50,7 @@
 //!         var_cos: 1e-6,
 //!         axis_with_cos: Some([0.0; 3]),
 //!         cos_per_px: 1e-3,
+//!         common: None,
 //!     };
 //!     Head::new(&free, &vehicle_from_camera, &[0.0; 6], 0.0)
 //! });

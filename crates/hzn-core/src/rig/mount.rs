@@ -1,7 +1,7 @@
 //! The attitude of a head on the vehicle, with its covariance.
 
-use super::head::symmetric;
-use crate::base::linalg::{M3, V3};
+use super::head::{symmetric, upper};
+use crate::base::linalg::V3;
 use crate::base::real::Real;
 use crate::geometry::frames::{Cam, Rotation, Vehicle};
 
@@ -68,11 +68,6 @@ fn product<T: Real>([aw, ax, ay, az]: [T; 4], [bw, bx, by, bz]: [T; 4]) -> [T; 4
         aw * by - ax * bz + ay * bw + az * bx,
         aw * bz + ax * by - ay * bx + az * bw,
     ]
-}
-
-/// Returns the upper triangle of a symmetric matrix.
-pub(super) fn upper<T: Real>(m: &M3<T>) -> [T; 6] {
-    [m.m11, m.m12, m.m13, m.m22, m.m23, m.m33]
 }
 
 #[cfg(test)]

@@ -2,14 +2,13 @@
 
 use core::f64::consts::TAU;
 
-use super::head::symmetric;
-use super::mount::upper;
+use super::head::{symmetric, upper};
 use crate::base::linalg::{M3, V3, basis, invert_spd3};
 use crate::base::real::Real;
 use crate::geometry::camera::Camera;
-use crate::geometry::frames::{Cam, UnitVec3};
+use crate::geometry::frames::{Cam, Cov3, UnitVec3};
 use crate::model::body::tilt_km;
-use crate::model::report::Free;
+use crate::model::report::{Free, FreeCommon};
 
 /// Largest distance of two azimuths at which the height is taken: 5 degrees, which is 250 km or less for a low orbit
 /// and finer than the weather.
@@ -85,21 +84,27 @@ impl<T: Real> Limb<T> {
         let middle = arcs.first().zip(arcs.last()).map_or(T::ZERO, |(a, b)| (a[0] + b[1]) * T::from_f64(0.5));
         let chords = self.radius_km * cos * T::from_f64(2.0) / self.own_length_km;
         let mut own = *free;
-        let Some(p) = taken_up(&arcs, middle, sin, chords) else {
-            // Without an arc the height is taken as a constant.
-            own.var_cos += by_height * by_height;
-            return own;
-        };
-        let p = p * (by_height * by_height);
+        // Without an arc the height is taken as a constant.
+        let constant = || M3::from_diagonal(&V3::new(T::ZERO, T::ZERO, one));
+        let p = taken_up(&arcs, middle, sin, chords).unwrap_or_else(constant) * (by_height * by_height);
         let (s, c) = middle.sin_cos();
         // The directions to the middle of the arcs and along them.
         let (to, along) = (b1 * c + b2 * s, b2 * c - b1 * s);
         let both = to * along.transpose();
         let added = to * to.transpose() * p.m11 + (both + both.transpose()) * p.m12 + along * along.transpose() * p.m22;
-        own.covariance.upper_rad2 = upper(&(symmetric(&free.covariance.upper_rad2) + added));
-        let with_cos = to * p.m13 + along * p.m23;
-        own.axis_with_cos = free.axis_with_cos.map(|[x, y, z]| [x + with_cos.x, y + with_cos.y, z + with_cos.z]);
+        let axis = |free: &Cov3<Cam, T>| Cov3::from_upper(upper(&(symmetric(&free.upper_rad2) + added)));
+        let moved = to * p.m13 + along * p.m23;
+        let with_cos = |[x, y, z]: [T; 3]| [x + moved.x, y + moved.y, z + moved.z];
+        own.covariance = axis(&free.covariance);
+        own.axis_with_cos = free.axis_with_cos.map(with_cos);
         own.var_cos += p.m33;
+        // Pictures that are less than a length of the weather apart see the same weather, so that all of it is common.
+        // That is too much for a slow sequence, and never too little.
+        own.common = free.common.map(|common| FreeCommon {
+            covariance: axis(&common.covariance),
+            var_cos: common.var_cos + p.m33,
+            axis_with_cos: with_cos(common.axis_with_cos),
+        });
         own
     }
 }

@@ -7,6 +7,8 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::dice::Dice;
 
+mod shared;
+
 /// Half-angle of the Earth's limb from 500 km.
 const HALF_ANGLE_RAD: f64 = 1.19;
 /// Half of the arc that a head of 60 degrees sees, in azimuth about the direction to the body.
@@ -76,6 +78,7 @@ impl Camera {
             var_cos: p.m33,
             axis_with_cos: Some((basis[0] * p.m13 + basis[1] * p.m23).into()),
             cos_per_px: 1e-3,
+            common: None,
         }
     }
 

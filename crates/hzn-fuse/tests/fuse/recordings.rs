@@ -19,6 +19,10 @@ fn row(index: u64, head: Option<&str>) -> Row {
     [row.axis_x, row.axis_y, row.axis_z] = [0.0, 0.0, 1.0].map(Some);
     [row.cov_xx, row.cov_xy, row.cov_xz] = [1e-6, 0.0, 0.0].map(Some);
     [row.cov_yy, row.cov_yz, row.cov_zz] = [1e-6, 0.0, 0.0].map(Some);
+    // The heads of a rig have other common parts than its joint answer.
+    let common = if head == Some("rig") { 4e-7 } else { 9e-7 };
+    [row.cov_common_xx, row.cov_common_xy, row.cov_common_xz] = [common, 0.0, 0.0].map(Some);
+    [row.cov_common_yy, row.cov_common_yz, row.cov_common_zz] = [common, 0.0, 0.0].map(Some);
     row.head = head.map(str::to_owned);
     row
 }
@@ -29,6 +33,11 @@ fn a_rig_is_one_sensor_in_the_axes_of_the_vehicle() {
     let rig = Recording::new("flight".into(), rows, None).unwrap();
     assert_eq!(rig.seen.len(), 3);
     assert!(rig.rows.iter().all(|row| row.head.as_deref() == Some("rig")));
+    // Slow error and white noise.
+    assert!(rig.seen.iter().all(|seen| {
+        let [slow, white] = seen.largest_variances_rad2();
+        (slow - 4e-7).abs() < 1e-18 && (white - 6e-7).abs() < 1e-18
+    }));
     assert!(rig.mount.unwrap().into_inner().angle() < 1e-12);
     let heads = vec![row(0, Some("left"))];
     let why = Recording::new("flight".into(), heads, None).unwrap_err().to_string();

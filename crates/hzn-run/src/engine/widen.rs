@@ -2,7 +2,7 @@
 
 use hzn_core::frames::{Cov3, UnitVec3};
 use hzn_core::real::Real;
-use hzn_core::report::{Candidate, Free, Position};
+use hzn_core::report::{Candidate, Free, FreeCommon, Position};
 use hzn_core::{Report, Solution};
 
 /// Converts a report to f64.
@@ -61,5 +61,10 @@ fn widen_free<T: Real + Into<f64>>(f: &Free<T>) -> Free<f64> {
         var_cos: f.var_cos.into(),
         axis_with_cos: f.axis_with_cos.map(|p| p.map(Into::into)),
         cos_per_px: f.cos_per_px.into(),
+        common: f.common.map(|common| FreeCommon {
+            covariance: Cov3::from_upper(common.covariance.upper_rad2.map(Into::into)),
+            var_cos: common.var_cos.into(),
+            axis_with_cos: common.axis_with_cos.map(Into::into),
+        }),
     }
 }

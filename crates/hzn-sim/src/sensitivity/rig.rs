@@ -92,6 +92,7 @@ impl RigDesign {
             var_cos: p.m33,
             axis_with_cos: Some(with_cos.into()),
             cos_per_px: 0.0,
+            common: None,
         })
     }
 

@@ -11,7 +11,7 @@ use crate::model::body::Expected;
 use crate::model::body::Target;
 use crate::model::error_budget::ErrorBudget;
 use crate::model::observer::{Border, Observer};
-use crate::model::report::{Candidate, Free, Report, Solution};
+use crate::model::report::{Candidate, Free, FreeCommon, Report, Solution};
 use crate::model::status::Stage;
 use crate::model::verdict::Verdict;
 use crate::model::work;
@@ -255,8 +255,8 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         let axis = UnitVec3::assume_unit(fused.e);
         let one = T::one();
         let (b1, b2) = basis(&fit.e);
-        let [by_1, by_2] = fused.by_cos;
         let half_angle = |k: T| (k * (one + one - k)).max(T::ZERO).sqrt().atan2(one - k);
+        let in_camera = |[on_1, on_2]: [T; 2]| -> [T; 3] { (b1 * on_1 + b2 * on_2).into() };
         let solution = Solution {
             axis,
             covariance,
@@ -274,10 +274,15 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
                 covariance: Cov3::from_tangent(&b1, &b2, fused.free_p),
                 cos: fit.c,
                 var_cos,
-                axis_with_cos: Some((b1 * fused.free_with_cos[0] + b2 * fused.free_with_cos[1]).into()),
+                axis_with_cos: Some(in_camera(fused.free_with_cos)),
                 cos_per_px: fit.sums.cos_per_px(),
+                common: fused.free_common.map(|p| FreeCommon {
+                    covariance: Cov3::from_tangent(&b1, &b2, [p.m11, p.m12, p.m22]),
+                    var_cos: p.m33,
+                    axis_with_cos: in_camera([p.m13, p.m23]),
+                }),
             }),
-            axis_by_cos: Some((b1 * by_1 + b2 * by_2).into()),
+            axis_by_cos: Some(in_camera(fused.by_cos)),
             position: None,
             p_limb: None,
             is_airglow: expected.is_airglow,

@@ -20,6 +20,11 @@ fn turned<T: Real>(fx_px: f64, length_km: f64, roll: f64) -> Free<T> {
         var_cos: T::ZERO,
         axis_with_cos: Some([T::ZERO; 3]),
         cos_per_px: T::from_f64(1e-3),
+        common: Some(FreeCommon {
+            covariance: Cov3::from_upper([T::ZERO; 6]),
+            var_cos: T::ZERO,
+            axis_with_cos: [T::ZERO; 3],
+        }),
     };
     let limb = Limb {
         radius_km: T::from_f64(LIMB_KM),
@@ -85,6 +90,16 @@ fn single_precision_gives_the_same_weather() {
         let near = wide.iter().zip(narrow).all(|(wide, narrow)| (narrow / wide - 1.0).abs() < 0.02);
         assert!(near, "{fx_px}: {narrow:?} {wide:?}");
     }
+}
+
+#[test]
+fn the_next_epoch_sees_the_same_weather() {
+    // The cone has no error but the weather.
+    let free = added::<f64>(554.0, 1000.0);
+    let common = free.common.unwrap();
+    assert_eq!(common.covariance.upper_rad2, free.covariance.upper_rad2);
+    assert_eq!((common.var_cos, Some(common.axis_with_cos)), (free.var_cos, free.axis_with_cos));
+    assert!(common.var_cos > 0.0);
 }
 
 #[test]

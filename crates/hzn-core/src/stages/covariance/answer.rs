@@ -29,6 +29,9 @@ pub(crate) struct Fused<T> {
     pub(crate) free_p: [T; 3],
     /// Covariance of the freely fitted axis with its cosine, on the same basis.
     pub(crate) free_with_cos: [T; 2],
+    /// The part of the covariance of the freely fitted (δ₁₂, δc) that the next picture shares, on the same basis;
+    /// `None` if the method does not know it.
+    pub(crate) free_common: Option<M3<T>>,
     /// Derivative of the axis by the cosine of the expected half-angle, on the tangent basis of the fitted axis.
     pub(crate) by_cos: [T; 2],
     /// Variance of the freely fitted cos α; `None` when it was not fitted.

@@ -38,6 +38,7 @@ pub(super) fn fused<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, config: &Config)
         common: None,
         free_p: across,
         free_with_cos: [T::ZERO; 2],
+        free_common: None,
         // The expected half-angle is not fused in the paper, so that its terms are 0.
         by_cos: [T::ZERO; 2],
         var_free_cos: Some(var_c),

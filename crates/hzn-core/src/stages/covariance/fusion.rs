@@ -54,6 +54,7 @@ pub(super) fn fused<T: Real>(
         common: Some(turned(sum(sum(common, late), [prior.x * prior.x, prior.x * prior.y, prior.y * prior.y]))),
         free_p,
         free_with_cos: [p.m13, p.m23],
+        free_common: Some(covariance.common),
         by_cos: [k.x, k.y],
         var_free_cos: var_free,
         // The test is made before the fusion. Afterwards both half-angles agree by construction.
@@ -108,6 +109,7 @@ fn unfused<T: Real>(
         common: Some(with_prior(&(covariance.common + covariance.late))),
         free_p,
         free_with_cos: [p.m13, p.m23],
+        free_common: Some(covariance.common),
         by_cos: k,
         var_free_cos: var_free,
         chi2: T::ZERO,

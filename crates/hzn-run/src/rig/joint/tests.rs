@@ -37,7 +37,15 @@ fn joiner() -> Joiner {
 fn finished(time_s: f64, has_cone: bool) -> Finished {
     let axis = UnitVec3::try_new([0.0, 0.0, 1.0]).unwrap();
     let covariance = Cov3::from_upper([1e-6, 0.0, 0.0, 1e-6, 0.0, 0.0]);
-    let free = Free { axis, covariance, cos: 0.4, var_cos: 1e-6, axis_with_cos: Some([0.0; 3]), cos_per_px: 1e-3 };
+    let free = Free {
+        axis,
+        covariance,
+        cos: 0.4,
+        var_cos: 1e-6,
+        axis_with_cos: Some([0.0; 3]),
+        cos_per_px: 1e-3,
+        common: None,
+    };
     let solution = Solution {
         axis,
         covariance,
