@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use hzn_flight::answer::{Direction, Edge, Outcome, Position};
 use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::cuc::Cuc;
+use hzn_flight::integrity::Integrity;
 use hzn_flight::joint::RigAnswer;
 use hzn_flight::layout::user_bytes;
 use hzn_flight::messages::{
@@ -57,6 +58,10 @@ fn values(apid: Apid, user: &[u8]) -> Option<Vec<f64>> {
         Apid::Position => {
             out.push(f64::from(from.u32()?));
             out.extend(Position::read(from)?.values());
+        }
+        Apid::Integrity => {
+            out.push(f64::from(from.u32()?));
+            out.extend(Integrity::read(from)?.values());
         }
         Apid::Navigation => out.extend(NavigationState::read(from)?.values()),
         Apid::Attitude => out.extend(AttitudeState::read(from)?.values()),

@@ -82,6 +82,8 @@ TABLES = {
         "f4:common_xx f4:common_xy f4:common_xz f4:common_yy f4:common_yz f4:common_zz "
         "f4:half_angle f4:separation f4:separation_limit f4:protection"
     ),
+    0x10B: "u4:picture f4:p_limb f4:protection "
+    "f4:common_xx f4:common_xy f4:common_xz f4:common_yy f4:common_yz f4:common_zz",
 }
 
 

@@ -141,7 +141,7 @@ impl Case {
         let layout = Layout::packed(camera.width.into(), camera.height.into(), 1, 8);
         let picture = Grey::try_new(&self.bytes, layout).expect("the picture is whole");
         let expected = horizon.expect(&self.prior).expect("the prior is possible");
-        PictureAnswer::from_report(&horizon.find(&picture, &expected))
+        PictureAnswer::from_report(&horizon.find(&picture, &expected), &self.sensor)
     }
 
     fn write(&self, out: &mut Vec<u8>) {

@@ -4,9 +4,10 @@ use hzn_core::frames::{Cov3, UnitVec3};
 use hzn_core::report::{Candidate, Counters, Free, MAX_LISTED};
 use hzn_core::status::{Stage, Status};
 use hzn_core::verdict::Verdict;
-use hzn_core::{Report, Solution};
+use hzn_core::{Config, Report, Solution};
 
 use crate::bytes::{Reader, Writer};
+use crate::integrity::Integrity;
 use crate::record::record;
 
 type Candidates = heapless::Vec<Candidate<f64>, MAX_LISTED>;
@@ -237,6 +238,8 @@ pub struct PictureAnswer {
     pub direction: Option<Direction>,
     /// The free fit and the position, if there is one of them.
     pub position: Option<Position>,
+    /// How far the direction can be trusted.
+    pub integrity: Option<Integrity>,
     /// The first candidates, including the chosen one.
     pub edges: [Option<Edge>; MAX_LISTED],
 }
@@ -249,8 +252,8 @@ impl core::ops::Deref for PictureAnswer {
 }
 
 impl PictureAnswer {
-    /// Makes the answer from a report.
-    pub fn from_report(report: &Report<f32>) -> Self {
+    /// Makes the answer from a report about the first body of this configuration.
+    pub fn from_report(report: &Report<f32>, config: &Config) -> Self {
         let c = &report.counters;
         let mut edges = [None; MAX_LISTED];
         for (edge, c) in edges.iter_mut().zip(&report.candidates) {
@@ -279,7 +282,9 @@ impl PictureAnswer {
             listed: report.candidates.len() as u8,
             solved: u8::from(direction.is_some()),
         };
-        Self { outcome, direction, position: report.solution.as_ref().and_then(Position::from_solution), edges }
+        let position = report.solution.as_ref().and_then(Position::from_solution);
+        let integrity = report.solution.as_ref().map(|s| Integrity::from_solution(s, config));
+        Self { outcome, direction, position, integrity, edges }
     }
 
     /// Returns the report in double precision, as on a workstation; `None` if a number in it has no meaning. The
@@ -296,7 +301,7 @@ impl PictureAnswer {
             Some(d) => Some(Solution {
                 axis: unit(widen(d.axis))?,
                 covariance: Cov3::from_upper(d.cov.map(f64::from)),
-                common: None,
+                common: self.integrity.and_then(|i| i.common()),
                 axis_fixed: unit(widen(d.axis_fixed)),
                 axis_vehicle: unit(widen(d.axis_vehicle)),
                 half_angle_rad: d.half_angle_rad.into(),
@@ -305,7 +310,7 @@ impl PictureAnswer {
                 free: self.position.and_then(|p| p.free()),
                 axis_by_cos: self.position.map(|p| widen(p.axis_by_cos)).filter(|v| !v.iter().any(|x| x.is_nan())),
                 position: None,
-                p_limb: None,
+                p_limb: self.integrity.and_then(|i| i.p_limb()),
                 is_airglow: false,
                 rms_px: d.rms_px.into(),
                 inliers: d.inliers,
@@ -350,13 +355,14 @@ impl PictureAnswer {
     pub fn read_science(from: &mut Reader<'_>) -> Option<Self> {
         let (outcome, direction) = (Outcome::read(from)?, Direction::read(from)?);
         let direction = (outcome.solved != 0).then_some(direction);
-        Some(Self { outcome, direction, position: None, edges: [None; MAX_LISTED] })
+        Some(Self { outcome, direction, position: None, integrity: None, edges: [None; MAX_LISTED] })
     }
 
-    /// Appends the whole answer: outcome, direction, position, and the listed candidates.
+    /// Appends the whole answer: outcome, direction, position, integrity, and the listed candidates.
     pub fn write(&self, out: &mut Writer<'_>) {
         self.write_science(out);
         self.position.unwrap_or(Position::NONE).write(out);
+        self.integrity.unwrap_or(Integrity::NONE).write(out);
         for e in self.edges.iter().flatten() {
             e.write(out);
         }
@@ -365,9 +371,9 @@ impl PictureAnswer {
     /// Reads a whole answer; `None` if it is cut off.
     pub fn read(from: &mut Reader<'_>) -> Option<Self> {
         let mut answer = Self::read_science(from)?;
-        let position = Position::read(from)?;
-        let is_known = position.values().any(|x| !x.is_nan());
-        answer.position = is_known.then_some(position);
+        let (position, integrity) = (Position::read(from)?, Integrity::read(from)?);
+        answer.position = position.values().any(|x| !x.is_nan()).then_some(position);
+        answer.integrity = answer.direction.map(|_| integrity);
         for edge in answer.edges.iter_mut().take(usize::from(answer.outcome.listed)) {
             *edge = Some(Edge::read(from)?);
         }
@@ -376,75 +382,4 @@ impl PictureAnswer {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn position() -> Position {
-        Position {
-            axis_free: [0.1, 0.2, 0.97],
-            cov_free: [1.0; 6],
-            cos_free: 0.3,
-            cos_free_variance: 1e-7,
-            cos_free_per_px: 1e-4,
-            axis_by_cos: [1.0, 2.0, 3.0],
-            position_m: [4e6, 5e6, 6e6],
-            pos_cov_m2: [1e9; 6],
-            range_m: 7e6,
-            range_sigma_m: 8e3,
-            body_fixed_m: [9e6, 1e6, 2e6],
-        }
-    }
-
-    #[test]
-    fn an_answer_survives_with_every_bit() {
-        let edge = Edge { number: 3, length_px: 1900, points: 600, inliers: 590, rms_px: 0.3, verdict: 0 };
-        let direction = Direction {
-            axis: [0.1, 0.2, 0.97],
-            cov: [1e-8, 2e-9, 3e-9, 4e-8, 5e-9, 6e-9],
-            axis_fixed: [0.0, 0.6, 0.8],
-            axis_vehicle: [1.0, 0.0, 0.0],
-            half_angle_rad: 1.2,
-            fused_half_angle_rad: 1.21,
-            altitude_est_m: 230e3,
-            altitude_est_sigma_m: 900.0,
-            rms_px: 0.3,
-            arc_px: 1888.0,
-            inliers: 590,
-            candidate: 1,
-        };
-        let mut edges = [None; MAX_LISTED];
-        (edges[0], edges[1]) = (Some(Edge { verdict: 5, ..edge }), Some(edge));
-        let outcome = Outcome {
-            status: 0,
-            stage: 7,
-            looks: 3,
-            level: 88,
-            followed: 2000,
-            candidates: 2,
-            dropped: 3,
-            fallback_points: 4,
-            edge_points: 600,
-            draws: 20,
-            work: 25_000,
-            listed: 2,
-            solved: 1,
-        };
-        let solved = PictureAnswer { outcome, direction: Some(direction), position: Some(position()), edges };
-        let empty = PictureAnswer {
-            outcome: Outcome { status: 1, solved: 0, listed: 0, ..outcome },
-            direction: None,
-            position: None,
-            edges: [None; MAX_LISTED],
-        };
-        for answer in [solved, empty] {
-            let mut bytes = [0; 640];
-            let mut out = Writer::new(&mut bytes);
-            answer.write(&mut out);
-            let n = out.finish().unwrap();
-            assert_eq!(PictureAnswer::read(&mut Reader::new(&bytes[..n])), Some(answer));
-            for cut in 0..n {
-                assert_eq!(PictureAnswer::read(&mut Reader::new(&bytes[..cut])), None);
-            }
-        }
-    }
-}
+mod tests;

@@ -4,6 +4,7 @@ use hzn_core::report::MAX_LISTED;
 
 use crate::answer::{Edge, PictureAnswer, Position};
 use crate::bytes::Reader;
+use crate::integrity::Integrity;
 use crate::messages::{AttitudeState, Exposure, NavigationState};
 use crate::packet::Apid;
 
@@ -12,6 +13,7 @@ use crate::packet::Apid;
 pub struct Assembly {
     picture: u32,
     position: Option<Position>,
+    integrity: Option<Integrity>,
     navigation: Option<NavigationState>,
     attitude: Option<AttitudeState>,
     edges: heapless::Vec<Edge, MAX_LISTED>,
@@ -22,7 +24,7 @@ pub struct Assembly {
 pub struct Assembled {
     /// Picture and time.
     pub exposure: Exposure,
-    /// The answer, with what has come of its position and of its candidates.
+    /// The answer, with what has come of its position, of its integrity and of its candidates.
     pub answer: PictureAnswer,
     /// The values from navigation that the picture was processed with.
     pub navigation: Option<NavigationState>,
@@ -48,6 +50,11 @@ impl Assembly {
             Apid::Position => {
                 self.begin(from.u32()?);
                 self.position = Some(Position::read(from)?);
+                None
+            }
+            Apid::Integrity => {
+                self.begin(from.u32()?);
+                self.integrity = Some(Integrity::read(from)?);
                 None
             }
             Apid::Navigation => {
@@ -79,7 +86,8 @@ impl Assembly {
     fn end(&mut self, exposure: Exposure, mut answer: PictureAnswer) -> Assembled {
         self.begin(exposure.picture);
         let come = core::mem::take(self);
-        answer.position = come.position;
+        // Without a direction there is nothing to trust, whatever a damaged stream says.
+        (answer.position, answer.integrity) = (come.position, answer.direction.and(come.integrity));
         for (place, edge) in answer.edges.iter_mut().zip(&come.edges) {
             *place = Some(*edge);
         }

@@ -2,6 +2,7 @@
 //! size.
 
 use crate::answer::{Direction, Edge, Outcome, Position};
+use crate::integrity::Integrity;
 use crate::joint::RigAnswer;
 use crate::messages::{
     Acknowledge, AttitudeState, EDGE_PIXELS, EdgePart, EdgePixel, EventRecord, Exposure, Housekeeping, NavigationState,
@@ -40,6 +41,7 @@ pub fn user_data(apid: Apid) -> Option<&'static [Part]> {
         Apid::Position => const { &[once(PICTURE), once(Position::TABLE)] },
         Apid::Navigation => const { &[once(NavigationState::TABLE)] },
         Apid::Attitude => const { &[once(AttitudeState::TABLE)] },
+        Apid::Integrity => const { &[once(PICTURE), once(Integrity::TABLE)] },
         Apid::Rig => const { &[once(RigAnswer::TABLE)] },
         Apid::Command => return None,
     })

@@ -10,6 +10,7 @@
 //! | [`operations`] | the parameters of the flight software itself |
 //! | [`bytes`] | conversion of numbers to bytes and back |
 //! | [`answer`] | a report as records, with every bit |
+//! | [`integrity`] | how far an answer can be trusted, as a record |
 //! | [`record`] | the fields of packets, with a table that describes them |
 //! | [`layout`] | the packets as lists of records |
 //! | [`cuc`] | the time code of packets |
@@ -42,6 +43,7 @@ pub mod bytes;
 pub mod cuc;
 pub mod flight;
 pub mod inbox;
+pub mod integrity;
 pub mod joint;
 pub mod layout;
 pub mod messages;

@@ -84,6 +84,9 @@ operations! {
     @306 "telemetry.science_bits_s" science_bits_s: Option<f64> = None, [1.0, 1e9];
     /// Whether six resets by the watchdog in a row lead to safe mode: 0 never, 1 before lift-off, 2 always.
     @307 "boot.safe_after_resets" safe_after_resets: u16 = 1, [0.0, 2.0];
+    /// Whether the integrity packets of pictures are sent: 0 no, 1 yes.
+    // A switch, because they are 15 % of the bytes of a clean picture, and some lines have no room for them.
+    @308 "telemetry.integrity" integrity: u16 = 1, [0.0, 1.0];
 }
 
 impl Operations {

@@ -61,6 +61,8 @@ numbered_enum! {
         Attitude = 0x109 => "attitude",
         /// The joint answer of the heads of a rig.
         Rig = 0x10A => "rig",
+        /// How far the answer to a picture can be trusted.
+        Integrity = 0x10B => "integrity",
         /// A telecommand.
         Command = 0x1C0 => "telecommand",
     }

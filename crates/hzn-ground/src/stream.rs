@@ -100,15 +100,14 @@ impl StreamCounts {
         };
         let from = &mut Reader::new(packet.user);
         let is_understood = match subject {
-            Some(apid @ (Apid::Science | Apid::Candidate | Apid::Position | Apid::Navigation | Apid::Attitude)) => {
-                match self.assembly.take(apid, packet.user) {
-                    Some(Some(picture)) => {
-                        self.picture(&picture, sink)?;
-                        true
-                    }
-                    part => part.is_some(),
-                }
-            }
+            Some(
+                apid @ (Apid::Science
+                | Apid::Candidate
+                | Apid::Position
+                | Apid::Integrity
+                | Apid::Navigation
+                | Apid::Attitude),
+            ) => self.part_of_picture(apid, packet.user, sink)?,
             Some(Apid::Housekeeping) => match Housekeeping::read(from) {
                 Some(record) => {
                     self.seen.push(Seen::Housekeeping(Box::new(record)));
@@ -134,6 +133,14 @@ impl StreamCounts {
             self.not_understood(packet);
         }
         Ok(())
+    }
+
+    /// Takes a packet of a picture. Returns whether it is understood.
+    fn part_of_picture(&mut self, apid: Apid, user: &[u8], sink: &mut Option<Sink>) -> Result<bool, Error> {
+        match self.assembly.take(apid, user) {
+            Some(Some(picture)) => self.picture(&picture, sink).map(|()| true),
+            part => Ok(part.is_some()),
+        }
     }
 
     fn not_understood(&mut self, packet: &Packet<'_>) {
@@ -216,6 +223,7 @@ impl StreamCounts {
         if let Some(position) = &answer.position {
             set_position(&mut row, position);
         }
+        row.protection_deg = answer.integrity.and_then(|i| i.protection_rad()).map(f64::to_degrees);
         let mut record = FrameRecord::new(row);
         record.candidates = CandidateEdge::from_report(&report);
         record.annotations = Annotations::default();

@@ -73,7 +73,7 @@
 #define HZN_TRUNCATED 7
 
 // Version of the structures and functions of this header. hzn_open compares it with that of the library.
-#define HZN_INTERFACE 3
+#define HZN_INTERFACE 4
 
 // Bytes that a sensor needs which fits 2048 points of an edge, on every machine.
 #define HZN_WORKSPACE_SIZE 114688
@@ -164,8 +164,9 @@ typedef struct {
   uint8_t verdict;
 } HznEdge;
 
-// The answer to a picture. Without a direction (status not 0) the values from axis to rms_px are NaN and inliers
-// is 0. After a call that returns an error, status is 255 and every other number is NaN or 0.
+// The answer to a picture. Without a direction (status not 0) the values from axis to rms_px and those from
+// p_limb on are NaN, and inliers is 0. After a call that returns an error, status is 255 and every other number
+// is NaN or 0.
 typedef struct {
   // Unit vector to the body, camera frame (x right, y down, z forward).
   float axis[3];
@@ -203,6 +204,15 @@ typedef struct {
   uint8_t attitude;
   // The first candidates, and the chosen one.
   HznEdge edges[16];
+  // Probability that the edge of the answer is the limb, which parameter 135 is compared with; NaN for bodies
+  // without air.
+  float p_limb;
+  // Angle that the error of axis exceeds with the probability of parameter 105 if the edge is the limb, rad; NaN
+  // without p_limb.
+  float protection_rad;
+  // The part of cov_rad2 whose error is the same in the next picture while the geometry stays. A mean of n answers
+  // has the covariance cov_common_rad2 + (cov_rad2 - cov_common_rad2) / n.
+  float cov_common_rad2[6];
 } HznAnswer;
 
 // What the heads of a rig share, and their mounts. hzn_rig_usual fills it.
@@ -266,7 +276,7 @@ typedef struct {
 HZN_ASSERT(sizeof(HznKnown) == 112, "the size of HznKnown");
 HZN_ASSERT(sizeof(HznPicture) == 3 * sizeof(size_t) + 8, "the size of HznPicture");
 HZN_ASSERT(sizeof(HznEdge) == 24, "the size of HznEdge");
-HZN_ASSERT(sizeof(HznAnswer) == 484, "the size of HznAnswer");
+HZN_ASSERT(sizeof(HznAnswer) == 516, "the size of HznAnswer");
 HZN_ASSERT(sizeof(HznRigSetup) == 192, "the size of HznRigSetup");
 HZN_ASSERT(sizeof(HznRigAnswer) == 72, "the size of HznRigAnswer");
 #undef HZN_ASSERT

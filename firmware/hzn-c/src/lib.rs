@@ -79,7 +79,7 @@ pub const HZN_REJECTED: i32 = 6;
 pub const HZN_TRUNCATED: i32 = 7;
 
 /// Version of the structures and functions of this header. `hzn_open` compares it with that of the library.
-pub const HZN_INTERFACE: u32 = 3;
+pub const HZN_INTERFACE: u32 = 4;
 /// Bytes that a sensor needs which fits 2048 points of an edge, on every machine.
 pub const HZN_WORKSPACE_SIZE: usize = 114688;
 /// Bytes that a sensor needs which fits 608 points of an edge: enough for the default of `edge_points.keep_points`,
@@ -363,7 +363,7 @@ unsafe fn find_limb(
             kept.sensor.process(lists::<FEWER_POINTS>(sensor), &grey, &expected, &Unobserved)
         }
     };
-    *out = to_answer(&PictureAnswer::from_report(&report), attitude);
+    *out = to_answer(&PictureAnswer::from_report(&report, kept.sensor.config()), attitude);
     // SAFETY: the caller guarantees it. The rate was accepted above, so that all of its numbers are known, or none.
     let rate_rad_s = unsafe { known.as_ref() }.map(|known| known.rate_rad_s).filter(|[x, ..]| !x.is_nan());
     Ok((report, rate_rad_s))

@@ -85,6 +85,6 @@ pub unsafe extern "C" fn hzn_process_rows(
             stream.finish(lists::<FEWER_POINTS>(sensor), &Unobserved)
         }
     };
-    *out = to_answer(&PictureAnswer::from_report(&report), attitude);
+    *out = to_answer(&PictureAnswer::from_report(&report, kept.sensor.config()), attitude);
     i32::from(out.status)
 }

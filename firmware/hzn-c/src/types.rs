@@ -5,6 +5,7 @@ use hzn_core::body::{Kind, Last};
 use hzn_core::frames::{Cam, Cov3, UnitVec3};
 use hzn_flight::answer::{Edge, PictureAnswer};
 use hzn_flight::attitude::AttitudeAndSun;
+use hzn_flight::integrity::Integrity;
 
 /// A picture: one byte per pixel, row by row.
 #[repr(C)]
@@ -83,8 +84,9 @@ const USED: u8 = 1;
 /// Attitude and Sun: expired, and not used.
 const EXPIRED: u8 = 2;
 
-/// The answer to a picture. Without a direction (status not 0) the values from `axis` to `rms_px` are NaN and `inliers`
-/// is 0. After a call that returns an error, `status` is 255 and every other number is NaN or 0.
+/// The answer to a picture. Without a direction (status not 0) the values from `axis` to `rms_px` and those from
+/// `p_limb` on are NaN, and `inliers` is 0. After a call that returns an error, `status` is 255 and every other number
+/// is NaN or 0.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct HznAnswer {
@@ -124,6 +126,15 @@ pub struct HznAnswer {
     pub attitude: u8,
     /// The first candidates, and the chosen one.
     pub edges: [HznEdge; 16],
+    /// Probability that the edge of the answer is the limb, which parameter 135 is compared with; NaN for bodies
+    /// without air.
+    pub p_limb: f32,
+    /// Angle that the error of `axis` exceeds with the probability of parameter 105 if the edge is the limb, rad; NaN
+    /// without `p_limb`.
+    pub protection_rad: f32,
+    /// The part of `cov_rad2` whose error is the same in the next picture while the geometry stays. A mean of n answers
+    /// has the covariance `cov_common_rad2 + (cov_rad2 - cov_common_rad2) / n`.
+    pub cov_common_rad2: [f32; 6],
 }
 
 /// What the heads of a rig share, and their mounts. `hzn_rig_usual` fills it.
@@ -269,6 +280,7 @@ fn to_last(values: &HznKnown) -> Option<Option<Last<f32>>> {
 pub(crate) fn to_answer(a: &PictureAnswer, attitude: u8) -> HznAnswer {
     let nan = f32::NAN;
     let d = a.direction.as_ref();
+    let integrity = a.integrity.unwrap_or(Integrity::NONE);
     HznAnswer {
         axis: d.map_or([nan; 3], |d| d.axis),
         cov_rad2: d.map_or([nan; 6], |d| d.cov),
@@ -288,6 +300,9 @@ pub(crate) fn to_answer(a: &PictureAnswer, attitude: u8) -> HznAnswer {
         listed: a.listed,
         attitude,
         edges: a.edges.map(|edge| edge.map_or(HznEdge::default(), to_edge)),
+        p_limb: integrity.p_limb,
+        protection_rad: integrity.protection_rad,
+        cov_common_rad2: integrity.cov_common,
     }
 }
 
@@ -322,4 +337,7 @@ pub(crate) const NO_ANSWER: HznAnswer = HznAnswer {
     listed: 0,
     attitude: NOT_GIVEN,
     edges: [HznEdge { number: 0, length_px: 0, points: 0, inliers: 0, rms_px: f32::NAN, verdict: 0 }; 16],
+    p_limb: f32::NAN,
+    protection_rad: f32::NAN,
+    cov_common_rad2: [f32::NAN; 6],
 };

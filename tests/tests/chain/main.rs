@@ -12,6 +12,7 @@ mod free_axis;
 mod geostationary;
 mod hard;
 mod heads;
+mod integrity;
 mod jupiter;
 mod line_cost;
 mod looks;

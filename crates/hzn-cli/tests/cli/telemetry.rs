@@ -1,6 +1,6 @@
 //! `hzn telemetry`: the packets of pictures become the rows of `hzn run`.
 
-use crate::common::{Place, Ran};
+use crate::common::{Place, Ran, limb};
 use hzn_core::image::{Grey, Layout};
 use hzn_core::{FlightHorizon, Prior};
 use hzn_flight::answer::PictureAnswer;
@@ -34,6 +34,10 @@ impl Stream {
             with_picture(w);
             answer.position.unwrap().write(w);
         });
+        self.add(Apid::Integrity, Some(time), |w| {
+            with_picture(w);
+            answer.integrity.unwrap().write(w);
+        });
         for edge in answer.edges.iter().flatten() {
             self.add(Apid::Candidate, Some(time), |w| {
                 with_picture(w);
@@ -60,11 +64,17 @@ fn disc(position: bool) -> (Place, PictureAnswer) {
         Luma([(20.0 + 180.0 * (0.5 + inside_px / 2.0).clamp(0.0, 1.0)) as u8])
     });
     picture.save(place.path("in/disc.png")).unwrap();
+    let answer = answer(&place, &picture);
+    (place, answer)
+}
+
+/// Returns the answer of the flight computer to a picture, with the sensor of the folder.
+fn answer(place: &Place, picture: &GrayImage) -> PictureAnswer {
     let config = hzn_files::sensor::load(&place.path("in/sensor.toml")).unwrap().config;
     let mut horizon = FlightHorizon::boxed(&config).unwrap();
     let grey = Grey::try_new(picture.as_raw(), Layout::packed(320, 240, 1, 8)).unwrap();
     let expected = horizon.expect(&Prior::default()).unwrap();
-    (place, PictureAnswer::from_report(&horizon.find(&grey, &expected)))
+    PictureAnswer::from_report(&horizon.find(&grey, &expected), &config)
 }
 
 fn exposure(picture: u32) -> Exposure {
@@ -79,15 +89,13 @@ fn exposure(picture: u32) -> Exposure {
     }
 }
 
-/// Returns the cells of the first row by their names, without those that name the picture and its times, and without
-/// the common part of the covariance, which is not sent.
+/// Returns the cells of the first row by their names, without those that name the picture and its times.
 fn cells(place: &Place, file: &str) -> Vec<(String, String)> {
     let text = std::fs::read_to_string(place.path(file)).unwrap();
     let mut lines = text.lines().map(|l| l.split(',').map(str::to_owned).collect::<Vec<_>>());
     let (columns, row) = (lines.next().unwrap(), lines.next().unwrap());
     let other = ["index", "file", "time_s", "elapsed_us", "altitude_km", "crc32"];
-    let is_sent = |column: &str| !other.contains(&column) && !column.starts_with("cov_common");
-    columns.into_iter().zip(row).filter(|(column, _)| is_sent(column)).collect()
+    columns.into_iter().zip(row).filter(|(column, _)| !other.contains(&column.as_str())).collect()
 }
 
 #[test]
@@ -115,6 +123,45 @@ fn rows_have_every_column_of_a_run() {
             assert!(value.parse::<f64>().is_ok_and(|x| x != 0.0), "{column}: {value:?}");
         }
     }
+}
+
+/// The limb of the Earth has a probability and a protection level. If their packet is lost, the row says nothing.
+#[test]
+fn rows_have_the_integrity_of_a_run() {
+    let (place, picture) = (Place::without_tone(), limb(320, 240, 0.0));
+    picture.save(place.path("in/0000.png")).unwrap();
+    let answer = answer(&place, &picture);
+    let exposure = Exposure { body: 1, ..exposure(1) };
+    let mut stream = Stream::default();
+    stream.add_picture(Cuc::since_start(1_000_000), &exposure, &answer);
+    place.write("sent.bin", &stream.bytes);
+    place.run(&["telemetry", "sent.bin", "-o", "sent.csv"]).expect(0);
+    place.run(&["run", "in", "--flight", "-o", "here.csv"]).expect(0);
+    let (sent, here) = (cells(&place, "sent.csv"), cells(&place, "here.csv"));
+    for ((column, there), (_, value)) in sent.iter().zip(&here) {
+        if column == "protection_deg" {
+            // Telemetry has it in single precision.
+            let [there, value] = [there, value].map(|text| text.parse::<f64>().unwrap());
+            assert!((there / value - 1.0).abs() < 1e-6, "{there} {value}");
+        } else {
+            assert_eq!(there, value, "{column}");
+        }
+    }
+    let value = |name: &str| sent.iter().find(|(column, _)| column == name).unwrap().1.parse::<f64>();
+    assert!(value("p_limb").is_ok_and(|p| (0.5..1.0).contains(&p)) && value("cov_common_zz").is_ok());
+
+    let mut stream = Stream::default();
+    stream.add(Apid::Science, Some(Cuc::since_start(1_000_000)), |w| {
+        exposure.write(w);
+        answer.write_science(w);
+    });
+    place.write("lost.bin", &stream.bytes);
+    place.run(&["telemetry", "lost.bin", "-o", "lost.csv"]).expect(0);
+    let lost = cells(&place, "lost.csv");
+    for name in ["p_limb", "protection_deg", "cov_common_xx", "cov_common_zz"] {
+        assert_eq!(lost.iter().find(|(column, _)| column == name).unwrap().1, "", "{name}");
+    }
+    assert!(lost.iter().any(|(column, value)| column == "axis_x" && !value.is_empty()));
 }
 
 #[test]
@@ -236,7 +283,7 @@ fn the_dictionary_is_that_of_the_records() {
     let command = "hzn telemetry --xtce > book/reference/telemetry.xtce.xml";
     assert!(printed == committed, "write the file again: {command}");
     let moved = place.run(&["telemetry", "--xtce", "--apid-base", "0x240"]).expect(0).out;
-    // Only the APIDs move: 0x100 to 0x10A become 0x240 to 0x24A, and that of telecommands 0x1C0 to 0x300.
+    // Only the APIDs move: 0x100 to 0x10B become 0x240 to 0x24B, and that of telecommands 0x1C0 to 0x300.
     let apid = |digits: &str| format!("packet_apid\" value=\"{digits}");
     let packets = committed.replace(&apid("25"), &apid("57")).replace(&apid("26"), &apid("58"));
     assert_eq!(moved, packets.replace("binaryValue=\"19C0\"", "binaryValue=\"1B00\""));

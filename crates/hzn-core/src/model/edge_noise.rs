@@ -88,7 +88,7 @@ section! {
         /// A smaller value makes the level larger: 2.95 `sigma_max_deg` for 10⁻², 4.55 for 10⁻³, 6.15 for 10⁻⁴. The
         /// probability holds for an edge that is the limb, by day, with the defaults of `[covariance]`.
         // The range is that of the factor in `protection.rs`.
-        @- protection_probability: f64 = 1e-4, [1e-4 to 1e-2];
+        @105 protection_probability: f64 = 1e-4, [1e-4 to 1e-2];
         /// For `braun-barf`: whether the largest variance is used in every direction.
         ///
         /// This is the overbound of Braun & Barf 2022, (37), which is about twenty times too large.

@@ -298,7 +298,7 @@ pub struct Solution<T> {
     pub covariance: Cov3<Cam, T>,
     /// The part of `covariance` whose error is the same in the next picture while the geometry stays, rad², rank 2. A
     /// mean of n such answers has the covariance common + (covariance − common)/n. `None` if the method does not know
-    /// the part (`braun-barf`), or when the answer came by telemetry.
+    /// the part (`braun-barf`), or when the answer came by telemetry without the integrity packet.
     ///
     /// All terms of the [`ErrorBudget`](crate::error_budget::ErrorBudget) are common except the errors of the edge
     /// points: the noise of the detector is new in every picture, and the vehicle moves past clouds. The part includes
@@ -325,7 +325,8 @@ pub struct Solution<T> {
     /// The position of the body's centre, with `fit.position`; `None` if the arc is too short for a position.
     pub position: Option<Position<T>>,
     /// Probability that the edge of the answer is the limb, from all [evidence](crate::evidence). It is only known for
-    /// bodies with air. `None` when the half-angle was not fitted, or when the answer came by telemetry.
+    /// bodies with air. `None` when the half-angle was not fitted, or when the answer came by telemetry without the
+    /// integrity packet.
     pub p_limb: Option<T>,
     /// Whether the limb is the outer edge of the layer of airglow (`body.night`). `false` when the answer came by
     /// telemetry.

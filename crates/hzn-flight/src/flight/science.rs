@@ -36,7 +36,10 @@ impl<B: Board> Flight<'_, B> {
         navigation: Option<NavigationState>,
         attitude: Option<AttitudeState>,
     ) {
-        let answer = PictureAnswer::from_report(report);
+        let mut answer = PictureAnswer::from_report(report, self.sensor.get().config());
+        if self.operations.get().integrity == 0 {
+            answer.integrity = None;
+        }
         let exposure_us = exposure.exposure_us;
         // All packets or none, because without the science packet the others belong to no answer.
         if !self.has_budget(&answer, [navigation.is_some(), attitude.is_some()], exposure.done_us) {
@@ -54,6 +57,12 @@ impl<B: Board> Flight<'_, B> {
             self.send_at(exposure_us, Apid::Position, |out| {
                 out.u32(picture);
                 position.write(out);
+            });
+        }
+        if let Some(integrity) = answer.integrity {
+            self.send_at(exposure_us, Apid::Integrity, |out| {
+                out.u32(picture);
+                integrity.write(out);
             });
         }
         for edge in answer.edges.iter().flatten() {
@@ -91,6 +100,7 @@ impl<B: Board> Flight<'_, B> {
             (Apid::Science, 1),
             (Apid::Candidate, answer.edges.iter().flatten().count()),
             (Apid::Position, usize::from(answer.position.is_some())),
+            (Apid::Integrity, usize::from(answer.integrity.is_some())),
             (Apid::Navigation, has_navigation),
             (Apid::Attitude, has_attitude),
         ];

@@ -250,7 +250,7 @@ pub(crate) fn take_sent(flight: &mut Flight<'_, Bench>) -> Sent {
         out.times.push((apid, packet.time.unwrap()));
         match apid {
             Apid::Housekeeping => out.housekeeping.push(Housekeeping::read(&mut r).unwrap()),
-            Apid::Science | Apid::Candidate | Apid::Position | Apid::Navigation | Apid::Attitude => {
+            Apid::Science | Apid::Candidate | Apid::Position | Apid::Integrity | Apid::Navigation | Apid::Attitude => {
                 if let Some(picture) = assembly.take(apid, packet.user).unwrap() {
                     assert_eq!(picture.missing_candidates, 0);
                     out.navigation.extend(picture.navigation);

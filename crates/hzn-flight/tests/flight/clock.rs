@@ -128,7 +128,8 @@ fn the_bits_of_pictures_stay_within_their_budget() {
                 if h.science.is_empty() {
                     continue;
                 }
-                assert!(h.science[0].1.position.is_some(), "a picture is sent whole");
+                let answer = &h.science[0].1;
+                assert!(answer.position.is_some() && answer.integrity.is_some(), "a picture is sent whole");
                 pictures += 1;
                 bytes += sent - h.housekeeping.len() * (OVERHEAD + Housekeeping::BYTES);
             }
@@ -142,5 +143,22 @@ fn the_bits_of_pictures_stay_within_their_budget() {
     // Twenty seconds.
     let (bytes, some) = budget(10_000.0);
     assert!(8 * bytes <= 20 * 10_000 + 10_000 && some > 20, "{bytes} bytes, {some} pictures of {all_bytes} bytes");
+    // The numbers of the documents: the picture has a free fit, and a direction.
+    let mut without = 0;
+    fly(ready(), |f| {
+        send(f, &command(1, Function::SetMode, |w| w.u8(Mode::Flight as u8)));
+        let set = command(1, Function::SetParameters, |w| {
+            w.u8(1);
+            w.u16(308);
+            w.f64(0.0);
+        });
+        assert_eq!(send(f, &set).answers[0].2, Code::Done);
+        f.board().pictures.push_back((limb(), 0));
+        f.turn();
+        without = f.board().sent.len();
+        let (_, answer) = take_sent(f).science[0];
+        assert!(answer.direction.is_some() && answer.integrity.is_none());
+    });
+    assert_eq!((all_bytes, without), (200 * 417, 361));
     println!("a picture has {} bytes; {some} of 200 pictures in 20 s with 10 000 bit/s", all_bytes / 200);
 }

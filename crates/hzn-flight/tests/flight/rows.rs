@@ -32,8 +32,8 @@ fn set(f: &mut Flight<'_, Bench>, values: &[(u16, f64)]) {
     assert_eq!(send(f, &set).answers, [(Function::SetParameters as u8, 1, Code::Done)]);
 }
 
-/// Flies over pictures and returns the answers (without the work, which differs in rows), the events, and the pixels
-/// of the longest edge of the first picture.
+/// Flies over pictures and returns the answers (without the work and the probability of the limb, which differ in
+/// rows), the events, and the pixels of the longest edge of the first picture.
 fn fly_over(
     bench: Bench,
     parameters: &[(u16, f64)],
@@ -48,7 +48,14 @@ fn fly_over(
         (0..=pictures.len()).for_each(|_| f.turn());
         let sent = take_sent(f);
         let mut answers: Vec<PictureAnswer> = sent.science.into_iter().map(|(_, answer)| answer).collect();
-        answers.iter_mut().for_each(|answer| answer.outcome.work = 0);
+        for answer in &mut answers {
+            answer.outcome.work = 0;
+            // Rows keep no brightness, whose terms the probability of the picture in memory has.
+            if let Some(integrity) = &mut answer.integrity {
+                assert!((0.0..=1.0).contains(&integrity.p_limb), "{integrity:?}");
+                integrity.p_limb = 0.0;
+            }
+        }
         (answers, sent.events, sent.edge.len())
     })
 }

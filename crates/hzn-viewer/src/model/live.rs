@@ -248,7 +248,13 @@ mod tests {
         let exposure = Exposure { picture: n, exposure_us: u64::from(n) * 100_000, ..Exposure::default() };
         let direction = Direction { axis: [0.0, 0.6, 0.8], cov: [4e-6, 0.0, 0.0, 1e-6, 0.0, 0.0], ..Direction::NONE };
         let outcome = Outcome { status: Status::Ok as u8, ..Outcome::default() };
-        let answer = PictureAnswer { outcome, direction: Some(direction), position: None, edges: Default::default() };
+        let answer = PictureAnswer {
+            outcome,
+            direction: Some(direction),
+            position: None,
+            integrity: None,
+            edges: Default::default(),
+        };
         Seen::Answer(Box::new(Assembled { exposure, answer, navigation: None, attitude: None, missing_candidates: 0 }))
     }
 

@@ -11,6 +11,7 @@ use hzn_core::status::Status;
 use hzn_flight::answer::{Direction, Outcome, PictureAnswer};
 use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::cuc::Cuc;
+use hzn_flight::integrity::Integrity;
 use hzn_flight::messages::{Acknowledge, Exposure, Housekeeping, Mode};
 use hzn_flight::packet::{Apid, ApidBase, MAX_BYTES, Scan, scan, write};
 use hzn_viewer::model::live::{ANSWERS, SentState};
@@ -22,13 +23,13 @@ use crate::window::{Window, files, flight, folder, run_into, settled, sized_wind
 /// A flight computer that only talks.
 #[derive(Default)]
 struct Computer {
-    sequences: [u16; 8],
+    sequences: [u16; 16],
     picture: u32,
 }
 
 impl Computer {
     fn packet(&mut self, apid: Apid, user: impl FnOnce(&mut Writer<'_>)) -> Vec<u8> {
-        let sequence = &mut self.sequences[apid as usize % 8];
+        let sequence = &mut self.sequences[apid as usize % 16];
         let mut bytes = [0; MAX_BYTES];
         let time = Some(Cuc::since_start(u64::from(self.picture) * 100_000));
         let n = write(&mut bytes, ApidBase::DEFAULT, apid, *sequence, time, user).unwrap();
@@ -54,6 +55,7 @@ impl Computer {
             outcome: Outcome { status: status as u8, solved: u8::from(status == Status::Ok), ..Outcome::default() },
             direction: (status == Status::Ok).then_some(direction),
             position: None,
+            integrity: None,
             edges: Default::default(),
         };
         let exposure_us = u64::from(n) * 100_000;
@@ -131,6 +133,17 @@ fn the_telemetry_of_a_flight_computer_is_shown() {
     stream.write_all(&computer.housekeeping(0)).unwrap();
     until(&mut window, "the packet after noise is lost", |v| has(v, |l| l.housekeeping.as_ref().unwrap().flags, 0));
     assert!(window.query_by_label_contains("the camera is silent").is_none());
+    // How far the answer can be trusted comes in a packet of its own, before the answer.
+    let picture = computer.picture + 1;
+    let integrity = Integrity { p_limb: 0.9985, protection_rad: 5e-3, ..Integrity::NONE };
+    let packet = computer.packet(Apid::Integrity, |out| {
+        out.u32(picture);
+        integrity.write(out);
+    });
+    assert!(window.query_by_label("p (limb)").is_none());
+    stream.write_all(&[packet, computer.answer()].concat()).unwrap();
+    until(&mut window, "no answer came", |v| has(v, |l| l.last.as_ref().unwrap().exposure.picture, picture));
+    assert!(window.query_by_label("0.9985").is_some() && window.query_by_label("0.2865°").is_some());
 }
 
 #[test]

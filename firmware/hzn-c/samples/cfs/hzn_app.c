@@ -101,6 +101,8 @@ static void process(const HZN_APP_Picture_t *message) {
     memcpy(answer_message.cov_rad2, answer.cov_rad2, sizeof answer.cov_rad2);
     answer_message.rms_px = answer.rms_px;
     answer_message.inliers = answer.inliers;
+    answer_message.p_limb = answer.p_limb;
+    answer_message.protection_rad = answer.protection_rad;
     CFE_SB_TimeStampMsg(CFE_MSG_PTR(answer_message.header));
     CFE_SB_TransmitMsg(CFE_MSG_PTR(answer_message.header), true);
 }

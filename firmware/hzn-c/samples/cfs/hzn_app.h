@@ -47,6 +47,8 @@ typedef struct {
     float cov_rad2[6];
     float rms_px;
     uint32 inliers;
+    float p_limb;
+    float protection_rad;
 } HZN_APP_Answer_t;
 
 /* Housekeeping. */

@@ -182,3 +182,30 @@ fn impossible_values_are_refused() {
         assert_eq!(program.process(fill).0, HZN_KNOWN, "{i}");
     }
 }
+
+#[test]
+fn an_answer_says_how_far_it_can_be_trusted() {
+    let program = Program::new();
+    let with = |values: &[(u16, f64)]| {
+        // SAFETY: the sensor was opened.
+        unsafe {
+            for &(number, value) in values {
+                assert_eq!(hzn_set(program.sensor, number, value), 0);
+            }
+            assert_eq!(hzn_apply(program.sensor), 0);
+        }
+        program.process(|_| ())
+    };
+    let (code, first) = with(&[]);
+    assert!(code == HZN_OK && (0.0..=1.0).contains(&first.p_limb), "{code} {}", first.p_limb);
+    let trace = |cov: [f32; 6]| cov[0] + cov[3] + cov[5];
+    assert!(trace(first.cov_common_rad2) > 0.0 && trace(first.cov_common_rad2) < trace(first.cov_rad2));
+    // The level is 6.15 sigma by default, and 2.95 sigma for a probability of 0.01.
+    let (_, likelier) = with(&[(105, 0.01)]);
+    assert!((first.protection_rad / likelier.protection_rad - 6.15 / 2.95).abs() < 1e-4);
+    assert!(first.protection_rad > 6.15 * (trace(first.cov_rad2) / 2.0).sqrt());
+    // Parameter 135 refuses what is less probable, and a refused answer has none of these numbers.
+    let (code, refused) = with(&[(136, 1e-9), (135, 0.5)]);
+    assert_eq!((code, refused.edges[0].verdict), (HZN_REJECTED, Verdict::Unlikely as u8));
+    assert!(refused.p_limb.is_nan() && refused.protection_rad.is_nan() && refused.cov_common_rad2[0].is_nan());
+}

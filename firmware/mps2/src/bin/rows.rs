@@ -73,6 +73,6 @@ fn run() -> Option<()> {
         let t3 = timer.ticks();
 
         let calls = [t1.wrapping_sub(t0), taking, t3.wrapping_sub(t2)];
-        write_result(&mut results, calls, [0; STAGES], &PictureAnswer::from_report(&report))?;
+        write_result(&mut results, calls, [0; STAGES], &PictureAnswer::from_report(&report, &parameters.sensor))?;
     }
 }

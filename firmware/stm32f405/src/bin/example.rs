@@ -12,7 +12,7 @@ use core::fmt::Debug;
 use cortex_m_rt::entry;
 use hzn_core::camera::{self, Model};
 use hzn_core::image::{Grey, Layout};
-use hzn_core::{Config, FlightHorizon, Prior, Report};
+use hzn_core::{Config, FlightHorizon, Prior};
 use hzn_firmware::host::{File, exit};
 use hzn_firmware::watermark;
 use hzn_flight::answer::PictureAnswer;
@@ -33,11 +33,11 @@ impl<E: Debug> From<E> for Failed {
 
 #[entry]
 fn main() -> ! {
-    let written = process().ok().and_then(|report| write(&report));
+    let written = process().ok().and_then(|answer| write(&answer));
     exit(if written.is_some() { 0 } else { 1 })
 }
 
-fn process() -> Result<Report<f32>, Failed> {
+fn process() -> Result<PictureAnswer, Failed> {
     let data = PIXELS.try_take().ok_or("the pixels are in use")?;
     if !File::open(c"picture.bin").ok_or("there is no picture")?.read(data) {
         return Err(Failed);
@@ -50,13 +50,13 @@ fn process() -> Result<Report<f32>, Failed> {
     let picture = Grey::try_new(&data[..], Layout::packed(64, 48, 1, 8))?;
     let expected = horizon.expect(&Prior { altitude_m: Some(231.5e3), ..Prior::default() })?;
     let report = horizon.process(&picture, &expected);
-    Ok(report)
+    Ok(PictureAnswer::from_report(&report, &config))
 }
 
-fn write(report: &Report<f32>) -> Option<()> {
+fn write(answer: &PictureAnswer) -> Option<()> {
     let mut bytes = [0; 640];
     let mut out = Writer::new(&mut bytes);
-    PictureAnswer::from_report(report).write(&mut out);
+    answer.write(&mut out);
     let n = out.finish()?;
     let mut file = File::create(c"answer.bin")?;
     (file.write(bytes.get(..n)?) && file.write(&watermark::stack_bytes().to_le_bytes())).then_some(())

@@ -193,6 +193,12 @@ impl View {
                 let (h, sigma) = (d.altitude_est_m * 1e-3, d.altitude_est_sigma_m * 1e-3);
                 lines.push(field("altitude", format!("{h:.1} ± {sigma:.1} km")));
             }
+            if let Some(p_limb) = last.answer.integrity.and_then(|i| i.p_limb()) {
+                lines.push(field("p (limb)", format!("{p_limb:.4}")));
+            }
+            if let Some(level_rad) = last.answer.integrity.and_then(|i| i.protection_rad()) {
+                lines.push(field("protection", format!("{:.4} deg", level_rad.to_degrees())));
+            }
         }
         lines.push(field("parameters", format!("copy {}, generation {}", h.parameter_copy, h.parameter_generation)));
         lines.push(field("commands", format!("{} done, {} rejected", h.commands, h.rejected)));
@@ -252,6 +258,7 @@ fn bounds(values: impl Iterator<Item = f64>) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use hzn_flight::answer::{Direction, Outcome, PictureAnswer};
+    use hzn_flight::integrity::Integrity;
     use hzn_flight::messages::Exposure;
     use hzn_flight::packet::ApidBase;
     use ratatui::Terminal;
@@ -269,6 +276,7 @@ mod tests {
             altitude_est_sigma_m: 1200.0,
             ..Direction::default()
         };
+        let integrity = Integrity { p_limb: 0.9985, protection_rad: 5e-3, ..Integrity::NONE };
         let is_found = !n.is_multiple_of(10);
         let status = if is_found { Status::Ok } else { Status::NoLimb } as u8;
         let exposure = Exposure { picture: n, exposure_us: u64::from(n) * 100_000, ..Exposure::default() };
@@ -276,6 +284,7 @@ mod tests {
             outcome: Outcome { status, ..Outcome::default() },
             direction: is_found.then_some(direction),
             position: None,
+            integrity: is_found.then_some(integrity),
             edges: Default::default(),
         };
         Seen::Answer(Box::new(Assembled { exposure, answer, navigation: None, attitude: None, missing_candidates: 0 }))
@@ -330,7 +339,10 @@ mod tests {
         assert_eq!(view.last_sequence(), Some(11));
         // Only a minute is kept, and a reset of the computer begins it again.
         assert_eq!(view.points.len(), 500);
-        view.take((501..=700).map(answer).collect());
+        view.take(vec![answer(501)]);
+        let shown = screen(&view, &counts, 100, 30);
+        assert!(shown.contains("p (limb)     0.9985") && shown.contains("protection   0.2865 deg"), "{shown}");
+        view.take((502..=700).map(answer).collect());
         assert_eq!(view.points.len(), 601);
         view.take(vec![answer(3)]);
         assert_eq!(view.points.len(), 1);

@@ -62,6 +62,12 @@ fn answer(live: &Live) -> Vec<(&'static str, String)> {
             let (km, sigma_km) = (d.altitude_est_m * 1e-3, d.altitude_est_sigma_m * 1e-3);
             rows.push(("altitude", format!("{km:.1} ± {sigma_km:.1} km")));
         }
+        if let Some(p_limb) = last.answer.integrity.and_then(|i| i.p_limb()) {
+            rows.push(("p (limb)", format!("{p_limb:.4}")));
+        }
+        if let Some(level_rad) = last.answer.integrity.and_then(|i| i.protection_rad()) {
+            rows.push(("protection", format!("{:.4}°", level_rad.to_degrees())));
+        }
     }
     rows.push(("calculation", ms(last.exposure.calculation_us)));
     rows
