@@ -1,5 +1,6 @@
 //! The flat result: one row per picture and body, the same in CSV, JSON Lines and MCAP.
 
+mod cell;
 mod detail;
 mod values;
 
@@ -9,6 +10,7 @@ use hzn_core::report::Position;
 use hzn_core::status::Status;
 use hzn_core::{Report, Solution};
 
+use cell::Cell;
 use detail::{describe, describe_answer};
 use serde::{Deserialize, Serialize};
 
@@ -61,46 +63,19 @@ macro_rules! columns {
             fn empty_cells() -> Self {
                 Self { $($name: Cell::empty(),)+ }
             }
-        }
-    };
-}
 
-/// The type of a cell.
-#[cfg_attr(not(feature = "recordings"), allow(dead_code, reason = "only recordings have a schema"))]
-trait Cell {
-    /// Type of the cell in JSON.
-    const JSON: &'static str;
-    /// Whether every row has a value in this cell.
-    const ALWAYS: bool = true;
-    fn empty() -> Self;
-}
+            /// Returns the texts of the row, in the order of the columns. A recording that others wrote may have any
+            /// text in each of them.
+            pub fn texts(&self) -> impl Iterator<Item = &str> {
+                [$(self.$name.text(),)+].into_iter().flatten()
+            }
 
-macro_rules! cells {
-    ($($ty:ty, $json:literal, $empty:expr;)+) => {$(
-        impl Cell for $ty {
-            const JSON: &'static str = $json;
-            fn empty() -> Self {
-                $empty
+            /// Changes each of [`Self::texts`].
+            pub fn change_texts(&mut self, mut change: impl FnMut(&mut String)) {
+                $(self.$name.text_mut().into_iter().for_each(&mut change);)+
             }
         }
-    )+};
-}
-cells! {
-    f64, "number", 0.0;
-    u16, "integer", 0;
-    u32, "integer", 0;
-    u64, "integer", 0;
-    bool, "boolean", false;
-    String, "string", String::new();
-    Status, "string", Status::Rejected;
-}
-
-impl<T: Cell> Cell for Option<T> {
-    const JSON: &'static str = T::JSON;
-    const ALWAYS: bool = false;
-    fn empty() -> Self {
-        None
-    }
+    };
 }
 
 columns! {

@@ -380,6 +380,12 @@ def test_a_generator_is_read_only_as_far_as_the_workers_need_it(client, archive,
     # Four shards wait for each of two threads. Each may be finished and not yet be counted when the next is read.
     assert (result.frames, len(result.shards)) == (FRAMES, FRAMES // 10) and max(ahead) <= 10 * (4 * 2 + 2)
     shards = [os.path.basename(shard) for shard in result.shards]
+    # The Rust program guards the same columns: all that are texts.
+    row = {name: f"={name}" for name in _shards._TEXTS} | {"axis_x": -0.5, "inliers": None}
+    guarded = _shards._change_texts(row, _shards._guarded)
+    assert guarded == {name: f"'={name}" for name in _shards._TEXTS} | {"axis_x": -0.5, "inliers": None}
+    assert _shards._change_texts(guarded, _shards._unguarded) == row
+    assert _shards._change_texts({"head": None}, _shards._guarded) == {"head": None}
     assert shards == sorted(shards)
 
     def broken():

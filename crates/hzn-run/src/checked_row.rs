@@ -26,30 +26,33 @@ pub(crate) fn header() -> String {
 /// Characters with which a spreadsheet begins a formula. Some skip a tab or a carriage return before it.
 const FORMULA: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
 
-/// Returns whether a spreadsheet would compute a text, or whether it looks like a [`guarded`] one.
+/// Returns whether a spreadsheet would compute a text, or whether it looks like a [`guard`]ed one.
 fn needs_guard(text: &str) -> bool {
     text.trim_start_matches('\'').starts_with(FORMULA)
 }
 
-/// Returns a text as a cell of CSV. The apostrophe at its beginning makes a spreadsheet take it as a text.
-fn guarded(text: &str) -> String {
-    if needs_guard(text) { format!("'{text}") } else { text.to_owned() }
-}
-
-/// Returns the text of a [`guarded`] cell.
-fn unguarded(cell: String) -> String {
-    match cell.strip_prefix('\'') {
-        Some(text) if needs_guard(text) => text.to_owned(),
-        _ => cell,
+/// Makes a text a cell of CSV. The apostrophe at its beginning makes a spreadsheet take it as a text.
+fn guard(text: &mut String) {
+    if needs_guard(text) {
+        text.insert(0, '\'');
     }
 }
 
-/// Returns a row as a line of CSV without its checksum and line end. Of its texts, only the name and the detail can
-/// contain what others wrote.
+/// Makes a [`guard`]ed cell its text again.
+fn unguard(cell: &mut String) {
+    if cell.strip_prefix('\'').is_some_and(needs_guard) {
+        cell.remove(0);
+    }
+}
+
+/// Returns a row as a line of CSV without its checksum and line end. All its texts are guarded: in a recording, others
+/// may have written any of them.
 fn to_csv(row: &Row) -> Result<Vec<u8>, Error> {
     let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
-    let written = if needs_guard(&row.file) || needs_guard(&row.detail) {
-        writer.serialize(Row { file: guarded(&row.file), detail: guarded(&row.detail), ..row.clone() })
+    let written = if row.texts().any(needs_guard) {
+        let mut row = row.clone();
+        row.change_texts(guard);
+        writer.serialize(row)
     } else {
         writer.serialize(row)
     };
@@ -121,8 +124,8 @@ pub(crate) fn from_csv(record: &csv::StringRecord, header: &csv::StringRecord) -
         csv::ErrorKind::Deserialize { err, .. } => err.kind().to_string(),
         _ => e.to_string(),
     };
-    let row = record.deserialize::<Row>(Some(header)).map_err(why)?;
-    let row = Row { file: unguarded(row.file), detail: unguarded(row.detail), ..row };
+    let mut row = record.deserialize::<Row>(Some(header)).map_err(why)?;
+    row.change_texts(unguard);
     let place = header.iter().position(|name| name == COLUMN);
     check(row, place.and_then(|i| record.get(i)))
 }
@@ -187,19 +190,32 @@ mod tests {
 
     #[test]
     fn a_spreadsheet_computes_no_text() {
-        let begins = ["=1+1", "+1", "-1", "@sum", "'=1", "''-", "'", "'a", "", "-", "a=1", "''", "\t=1", "\r=1", "'\t"];
-        for (file, detail) in begins.iter().flat_map(|file| begins.iter().map(move |detail| (file, detail))) {
-            let row = Row { file: (*file).to_owned(), detail: (*detail).to_owned(), axis_x: Some(-0.5), ..row() };
+        let begins =
+            ["=1+1", "+1", "-1", "@sum", "'=1", "''-", "'", "'a", "a", "-", "a=1", "''", "\t=1", "\r=1", "'\t"];
+        let texts =
+            Row { head: Some("b".into()), heads_used: Some("b".into()), heads_excluded: Some("c".into()), ..row() };
+        let count = texts.texts().count();
+        assert_eq!(count, 6);
+        let pairs: Vec<_> = begins.iter().flat_map(|a| begins.iter().map(move |b| (*a, *b))).collect();
+        for (place, (first, others)) in (0..count).flat_map(|place| pairs.iter().map(move |pair| (place, *pair))) {
+            let mut row = Row { axis_x: Some(-0.5), ..texts.clone() };
+            let mut column = 0;
+            row.change_texts(|text| {
+                *text = (if column == place { first } else { others }).to_owned();
+                column += 1;
+            });
             let line = csv_line(&row).unwrap();
             assert_eq!(read_csv(&line).as_ref(), Ok(&row));
             let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(line.as_slice());
             let record = reader.records().next().unwrap().unwrap();
-            let cell = |name: &str| record.get(Row::COLUMNS.iter().position(|c| *c == name).unwrap()).unwrap();
-            assert!(![cell("file"), cell("detail")].iter().any(|cell| cell.starts_with(FORMULA)), "{record:?}");
             // Numbers stay numbers, and JSON is read by no spreadsheet.
+            let is_number = |cell: &str| cell.parse::<f64>().is_ok() && !begins.contains(&cell);
+            let formulas = record.iter().filter(|cell| cell.starts_with(FORMULA) && !is_number(cell));
+            assert_eq!(formulas.count(), 0, "{record:?}");
+            let cell = |name: &str| record.get(Row::COLUMNS.iter().position(|c| *c == name).unwrap()).unwrap();
             assert_eq!(cell("axis_x"), "-0.5");
             assert_eq!(from_json(&json_line(&row).unwrap()).as_ref(), Ok(&row));
-            let written = format!("\"file\":{}", serde_json::to_string(file).unwrap());
+            let written = format!("\"body\":{}", serde_json::to_string(&row.body).unwrap());
             assert!(String::from_utf8(json_line(&row).unwrap()).unwrap().contains(&written));
         }
     }
@@ -210,6 +226,11 @@ mod tests {
         let (line, sum) = csv.trim_end().rsplit_once(',').unwrap();
         let line = line.replace(",12.5,", ",,");
         assert_eq!(format!("{:08x}", crc32fast::hash(line.as_bytes())), sum);
+        // The sum is that of the guarded texts.
+        let csv = String::from_utf8(csv_line(&Row { body: "=1+1".into(), ..row() }).unwrap()).unwrap();
+        let (guarded, other) = csv.trim_end().rsplit_once(',').unwrap();
+        assert_eq!(guarded.replace(",12.5,", ",,"), line.replace(",earth,", ",'=1+1,"));
+        assert_eq!(format!("{:08x}", crc32fast::hash(guarded.replace(",12.5,", ",,").as_bytes())), other);
     }
 
     #[test]

@@ -15,7 +15,7 @@ import os
 import re
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -26,8 +26,6 @@ from ._hzn import Report, Sensor, __version__, _Prior, _process_encoded, _write_
 Shard: TypeAlias = Sequence[tuple[str, Mapping[str, Any]]]
 
 _TEXTS = ("file", "body", "status", "detail", "head", "heads_used", "heads_excluded")
-# The texts that others wrote.
-_FOREIGN = ("file", "detail")
 _COUNTS = ("index", "edge_points", "inliers", "candidates", "dropped", "level")
 _UNPROCESSED = ("unreadable", "no-altitude")
 # What file systems call the mark of a file's contents, the best first. A time is the last resort.
@@ -160,12 +158,16 @@ def _unguarded(cell: str) -> str:
     return cell[1:] if re.match(r"'+[=+\-@\t\r]", cell) else cell
 
 
+def _change_texts(row: Mapping[str, Any], change: Callable[[str], str]) -> dict[str, Any]:
+    return {name: change(cell) if name in _TEXTS and cell is not None else cell for name, cell in row.items()}
+
+
 def _write_csv(path: str, _: Sensor, reports: Sequence[Report]) -> None:
     rows = _rows(reports)
     with open(path, "w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         table.writeheader()
-        table.writerows(row | {name: _guarded(row[name]) for name in _FOREIGN} for row in rows)
+        table.writerows(_change_texts(row, _guarded) for row in rows)
 
 
 _WRITERS: Mapping[str, Any] = {"parquet": _write_parquet, "csv": _write_csv, "mcap": _write_mcap}
@@ -183,7 +185,7 @@ def _unprocessed(filesystem: Any, name: str) -> list[dict[str, Any]]:
         columns = [table[c].tolist() for c in names]
     elif name.endswith(".csv"):
         with filesystem.open(name, "r", newline="", encoding="utf-8") as file:
-            return _failed([row | {name: _unguarded(row[name]) for name in _FOREIGN} for row in csv.DictReader(file)])
+            return _failed([_change_texts(row, _unguarded) for row in csv.DictReader(file)])
     else:
         import pyarrow.parquet
 
