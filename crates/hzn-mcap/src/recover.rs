@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::io::{self, BufReader, BufWriter, Read};
 use std::path::{Path, PathBuf};
 
-use crate::container::{Chunk, ChunkFault, Container, Fields, Inflation, MAGIC, Message, Op, Record, Scanner};
+use crate::container::{Chunk, ChunkFault, Container, Fields, Inflation, MAGIC, Message, Op, Record, Scanner, Schemas};
 use crate::error::{Error, while_writing};
 use crate::part::{open_part, part_path, publish};
 use crate::reader::{Contents, Reader};
@@ -25,6 +25,9 @@ pub struct Recovered {
     pub dropped_bytes: u64,
     /// Bytes behind the end of the recording, which are not read; see [`crate::Reader::bytes_after_end`].
     pub bytes_after_end: u64,
+    /// Number of messages that are on the topic of the reports, but have another schema. They are kept, but no reader
+    /// takes them for results; see [`crate::Reader::unread_reports`].
+    pub unread_reports: u64,
 }
 
 /// A recording that is continued.
@@ -203,7 +206,9 @@ fn copy_frames(
     let mut copier = FrameCopier {
         out,
         found: Recovered::default(),
+        schemas: Schemas::default(),
         report_channels: BTreeSet::new(),
+        foreign_channels: BTreeSet::new(),
         waiting: Vec::new(),
         inflation: Inflation::default(),
         is_broken: false,
@@ -240,8 +245,11 @@ fn copy_frames(
 struct FrameCopier<'a> {
     out: &'a mut Container<BufWriter<File>>,
     found: Recovered,
+    schemas: Schemas,
     /// Channels of the reports that are declared so far.
     report_channels: BTreeSet<u16>,
+    /// Channels with the topic of the reports, but with another schema.
+    foreign_channels: BTreeSet<u16>,
     /// Parts of frames, which wait for their reports.
     waiting: Vec<Part>,
     inflation: Inflation,
@@ -264,8 +272,7 @@ impl FrameCopier<'_> {
             Op::CHUNK => match Chunk::parse(&record, &mut self.inflation) {
                 Ok((chunk, plain)) => {
                     chunk.index.declared.iter().for_each(|(op, _, content)| self.read_declaration(*op, content));
-                    let reports = Chunk::messages(&plain).filter(|m| self.is_report(m)).count();
-                    return self.add_part(Part::Chunk(chunk), reports as u64);
+                    return self.add_part(Part::Chunk(chunk), Chunk::messages(&plain));
                 }
                 Err(ChunkFault::Compression(name)) => self.unknown_compression = Some(name),
                 Err(ChunkFault::Damaged(_)) => {
@@ -274,8 +281,8 @@ impl FrameCopier<'_> {
                 }
             },
             Op::MESSAGE => {
-                let reports = Message::parse(&record.content).filter(|m| self.is_report(m)).iter().count();
-                return self.add_part(Part::Message(record), reports as u64);
+                let content = record.content.clone();
+                return self.add_part(Part::Message(record), Message::parse(&content).into_iter());
             }
             // The message indexes are written again.
             Op::MESSAGE_INDEX => {}
@@ -287,19 +294,23 @@ impl FrameCopier<'_> {
         Ok(true)
     }
 
-    /// Takes notice of a channel of reports.
+    /// Takes notice of a channel with the topic of the reports.
     fn read_declaration(&mut self, op: u8, content: &[u8]) {
-        if op == Op::CHANNEL {
-            self.report_channels.extend(report_id(content));
+        let Some((id, channel)) = self.schemas.declare(op, content) else { return };
+        if Topic::of(&channel) == Some(Topic::Report) {
+            self.report_channels.insert(id);
+        } else if channel.topic == Topic::Report.name() {
+            self.foreign_channels.insert(id);
         }
     }
 
-    fn is_report(&self, message: &Message<'_>) -> bool {
-        self.report_channels.contains(&message.channel)
-    }
-
-    /// Writes a part and the parts that wait for it, unless it has to wait too.
-    fn add_part(&mut self, part: Part, reports: u64) -> io::Result<bool> {
+    /// Writes a part and the parts that wait for it, unless it has to wait too. `messages` are those of the part.
+    fn add_part<'m>(&mut self, part: Part, messages: impl Iterator<Item = Message<'m>>) -> io::Result<bool> {
+        let mut reports = 0;
+        for message in messages {
+            reports += u64::from(self.report_channels.contains(&message.channel));
+            self.found.unread_reports += u64::from(self.foreign_channels.contains(&message.channel));
+        }
         self.waiting.push(part);
         if !self.report_channels.is_empty() && reports == 0 {
             return Ok(false);
@@ -315,11 +326,4 @@ impl FrameCopier<'_> {
             Part::Message(record) => self.out.copy(&record),
         })
     }
-}
-
-/// Returns the id of a channel record if its topic is that of the reports.
-fn report_id(content: &[u8]) -> Option<u16> {
-    let mut f = Fields(content);
-    let (id, _schema, topic) = (f.u16()?, f.u16()?, f.text()?);
-    (topic == Topic::Report.name()).then_some(id)
 }

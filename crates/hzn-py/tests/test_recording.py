@@ -1,5 +1,7 @@
 """Tests of recordings, picture by picture."""
 
+import struct
+
 import numpy as np
 import pytest
 
@@ -68,6 +70,38 @@ def test_a_recording_in_an_unknown_compression_warns(recording):
         assert len(hzn.read_mcap(other)["file"]) == 0
     with pytest.warns(UserWarning, match='"zstx"'), hzn.open_mcap(other) as opened:
         assert list(opened) == []
+
+
+def mcap(schema):
+    """Return a recording of two messages in the place of results, as another program may write it."""
+
+    def text(value):
+        return struct.pack("<I", len(value)) + value
+
+    def record(op, content):
+        return struct.pack("<BQ", op, len(content)) + content
+
+    header = record(1, text(b"") + text(b"another program"))
+    declared = record(3, struct.pack("<H", 1) + text(schema) + text(b"jsonschema") + text(b"{}"))
+    channel = record(4, struct.pack("<HH", 1, 1) + text(b"/hzn/report") + text(b"json") + struct.pack("<I", 0))
+    messages = record(5, struct.pack("<HIQQ", 1, 0, 0, 0) + b"{}") * 2
+    end = record(15, bytes(4)) + record(2, bytes(20))
+    magic = b"\x89MCAP0\r\n"
+    return magic + header + declared + channel + messages + end + magic
+
+
+def test_reports_with_another_schema_are_told(tmp_path):
+    other = tmp_path / "other.mcap"
+    other.write_bytes(mcap(b"other.Report"))
+    what = "2 messages on /hzn/report cannot be read as results, because the channel has another schema"
+    with pytest.warns(UserWarning, match=what):
+        assert len(hzn.read_mcap(other)["file"]) == 0
+    with pytest.warns(UserWarning, match=what), hzn.open_mcap(other) as opened:
+        assert list(opened) == []
+    # With the name of hzn's schema they would be results, so it is the schema that is told.
+    other.write_bytes(mcap(b"hzn.Report"))
+    with pytest.raises(hzn.HznError, match="report of frame 0"):
+        hzn.read_mcap(other)
 
 
 def test_no_message_has_what_a_terminal_obeys(recording, tmp_path):

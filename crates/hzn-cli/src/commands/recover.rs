@@ -55,7 +55,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Err(usage(format!("{}: {what}", path.display())));
     }
     let written = std::fs::metadata(file).and_then(|data| data.modified());
-    let (rows, lost) = match target {
+    let kept = match target {
         sink::Target::Mcap => recording(file, &path)?,
         target => table(file, &path, target)?,
     };
@@ -63,8 +63,16 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Ok(written) = written {
         sink::set_written(&path, written)?;
     }
-    let dropped = if lost > 0 { format!(", {lost} bytes without whole pictures dropped") } else { String::new() };
-    tell::line(format_args!("{}: {} kept{dropped}", path.display(), explain::counted(rows, "row")));
+    let dropped = match kept.dropped_bytes {
+        0 => String::new(),
+        bytes => format!(", {bytes} bytes without whole pictures dropped"),
+    };
+    tell::line(format_args!("{}: {} kept{dropped}", path.display(), explain::counted(kept.rows, "row")));
+    if kept.unread_reports > 0 {
+        // The messages are kept, but the new file has no results in their place, so the old one stays.
+        tell::warning(source::describe_unread(&path, kept.unread_reports));
+        return Ok(Exit::SomeUnreadable);
+    }
     if unfinished && args.output.is_none() && file.exists() {
         // Its results are in the new file. Next to it, the old file would look like another unfinished run.
         std::fs::remove_file(file)?;
@@ -72,8 +80,16 @@ pub(super) fn run(args: &Args) -> Outcome {
     Ok(Exit::Done)
 }
 
-/// Recovers a table. Returns the number of rows kept and of bytes dropped.
-fn table(file: &Path, path: &Path, target: sink::Target) -> Result<(u64, u64), crate::exit::Stop> {
+/// What a recovery kept.
+struct Kept {
+    rows: u64,
+    dropped_bytes: u64,
+    /// Messages that are in the place of results and cannot be read.
+    unread_reports: u64,
+}
+
+/// Recovers a table.
+fn table(file: &Path, path: &Path, target: sink::Target) -> Result<Kept, crate::exit::Stop> {
     let found = sink::recover_text(file, path, target).map_err(|e| match e.kind() {
         std::io::ErrorKind::InvalidData => failed(format!("{}: {e}", file.display())),
         _ => disk::cannot_write(path, &e).into(),
@@ -81,7 +97,7 @@ fn table(file: &Path, path: &Path, target: sink::Target) -> Result<(u64, u64), c
     if let Some(damage) = found.damage {
         tell::warning(format_args!("{}: {damage}; only the rows before it are kept", file.display()));
     }
-    Ok((found.rows, found.dropped_bytes))
+    Ok(Kept { rows: found.rows, dropped_bytes: found.dropped_bytes, unread_reports: 0 })
 }
 
 /// Returns where a recording is recovered. The library never replaces a file; therefore the result is written next to
@@ -90,8 +106,8 @@ fn recovering(path: &Path) -> PathBuf {
     path.with_extension("recovering.mcap")
 }
 
-/// Recovers a recording. Returns the number of rows kept and of bytes dropped.
-fn recording(file: &Path, path: &Path) -> Result<(u64, u64), crate::exit::Stop> {
+/// Recovers a recording.
+fn recording(file: &Path, path: &Path) -> Result<Kept, crate::exit::Stop> {
     let recovering = recovering(path);
     if recovering.exists() {
         std::fs::remove_file(&recovering)?;
@@ -121,5 +137,5 @@ fn recording(file: &Path, path: &Path) -> Result<(u64, u64), crate::exit::Stop> 
     if found.bytes_after_end > 0 {
         tell::warning(source::describe_rest(file, found.bytes_after_end));
     }
-    Ok((found.frames, found.dropped_bytes))
+    Ok(Kept { rows: found.frames, dropped_bytes: found.dropped_bytes, unread_reports: found.unread_reports })
 }

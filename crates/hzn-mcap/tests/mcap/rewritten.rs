@@ -213,5 +213,12 @@ fn reports_with_another_schema_are_counted() {
         });
         let mut reader = Reader::open(&path, Contents::WithoutImages).unwrap();
         assert_eq!((reader.by_ref().count(), reader.unread_reports()), (0, FRAMES), "{name}");
+        // A recovery counts as the reader does, and keeps the messages.
+        let out = dir.path().join("recovered.mcap");
+        let found = recover(&path, &out).unwrap();
+        assert_eq!((found.frames, found.unread_reports, found.dropped_bytes), (0, FRAMES, 0), "{name}");
+        let mut reader = Reader::open(&out, Contents::WithoutImages).unwrap();
+        assert_eq!((reader.by_ref().count(), reader.unread_reports()), (0, FRAMES), "{name}");
+        fs::remove_file(&out).unwrap();
     }
 }

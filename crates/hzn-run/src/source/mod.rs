@@ -59,7 +59,7 @@ pub use payload::Payload;
 pub use picture::Picture;
 pub use raw::Raw;
 #[cfg(feature = "recordings")]
-pub use rerun::{describe_loss as describe_recording_loss, describe_rest, recorded_prior};
+pub use rerun::{describe_loss as describe_recording_loss, describe_rest, describe_unread, recorded_prior};
 pub use sequence::Source;
 pub use tone::FoundTone;
 

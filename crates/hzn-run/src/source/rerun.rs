@@ -138,6 +138,13 @@ pub fn describe_rest(path: &Path, bytes: u64) -> String {
     )
 }
 
+/// Says that a recording has messages where results are expected, but none that hzn can read.
+pub fn describe_unread(path: &Path, reports: u64) -> String {
+    let messages = explain::counted(reports, "message");
+    let what = "cannot be read as results, because the channel has another schema than hzn.Report";
+    format!("{}: {messages} on /hzn/report {what}; keep the schema when the file is written again", path.display())
+}
+
 /// Describes what is missing in a recording that was read to its end. `done` says what was done with the rest.
 pub fn describe_loss(reader: &Reader, path: &Path, done: &str) -> Option<String> {
     let name = path.display();
@@ -145,11 +152,7 @@ pub fn describe_loss(reader: &Reader, path: &Path, done: &str) -> Option<String>
         return Some(format!("{name}: cannot be read: {}", unknown_compression(compression)));
     }
     if reader.unread_reports() > 0 {
-        let messages = explain::counted(reader.unread_reports(), "message");
-        let what = "cannot be read as results, because the channel has another schema than hzn.Report";
-        return Some(format!(
-            "{name}: {messages} on /hzn/report {what}; keep the schema when the file is written again"
-        ));
+        return Some(describe_unread(path, reader.unread_reports()));
     }
     if reader.bytes_after_end() > 0 {
         return Some(describe_rest(path, reader.bytes_after_end()));
