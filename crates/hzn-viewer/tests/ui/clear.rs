@@ -1,37 +1,13 @@
 //! Tests that the window says what is missing, and that nothing lies over what is to be read.
 
+use std::fmt::Write as _;
+
 use egui::epaint::Shape;
 use egui::{Key, Modifiers, Rect};
 use egui_kittest::kittest::{NodeT, Queryable};
 use hzn_core::status::Status;
 
 use crate::window::*;
-
-/// Returns all texts that are painted, with their places.
-fn painted(window: &Window) -> Vec<(String, Rect)> {
-    fn collect(shape: &Shape, clip: Rect, out: &mut Vec<(String, Rect)>) {
-        match shape {
-            Shape::Vec(all) => all.iter().for_each(|one| collect(one, clip, out)),
-            Shape::Text(text) => {
-                let rect = text.visual_bounding_rect();
-                if clip.intersects(rect) {
-                    out.push((text.galley.text().to_owned(), rect));
-                }
-            }
-            _ => {}
-        }
-    }
-    let mut out = Vec::new();
-    for clipped in &window.output().shapes {
-        collect(&clipped.shape, clipped.clip_rect, &mut out);
-    }
-    out
-}
-
-fn place_of(window: &Window, is_it: impl Fn(&str) -> bool) -> Rect {
-    let texts = painted(window);
-    texts.iter().find(|(text, _)| is_it(text)).unwrap_or_else(|| panic!("not painted: {texts:?}")).1
-}
 
 #[test]
 fn a_picture_without_an_altitude_says_what_it_needs() {
@@ -132,6 +108,54 @@ fn an_axis_outside_of_the_picture_has_a_small_map() {
     let window = window_on(dir.path());
     assert_eq!(answer(&window).0, Status::Ok);
     assert!(!painted(&window).iter().any(|(text, _)| is_map(text)), "its axis is in the picture");
+}
+
+/// Returns the area of the small map: the smallest box around its text.
+fn map(window: &Window) -> Rect {
+    // A small map has room for fewer words.
+    let text =
+        place_of(window, |text| ["° around the optical axis", "° off axis"].iter().any(|end| text.ends_with(end)));
+    let boxes = window.output().shapes.iter().filter_map(|clipped| match &clipped.shape {
+        Shape::Rect(shape) => Some(shape.rect).filter(|rect| rect.contains_rect(text)),
+        _ => None,
+    });
+    boxes.min_by(|a, b| a.area().total_cmp(&b.area())).unwrap()
+}
+
+/// The arrow towards an axis that is up and right has its words in the corner of the map.
+#[test]
+fn the_small_map_covers_neither_the_words_of_the_arrow_nor_a_label() {
+    let (dir, directions) = (tempfile::tempdir().unwrap(), 8);
+    let mut residuals = "file,u_px,v_px,error_u_px,error_v_px,counts\n".to_owned();
+    for n in 0..directions {
+        let (sin, cos) = (f64::from(n) * std::f64::consts::TAU / f64::from(directions)).sin_cos();
+        limb([1.15f64.sin() * cos, 1.15f64.sin() * sin, 1.15f64.cos()])
+            .save(dir.path().join(format!("{n}.png")))
+            .unwrap();
+        writeln!(residuals, "{n}.png,100,100,0.3,0.4,1").unwrap();
+    }
+    std::fs::write(dir.path().join("sensor.toml"), SENSOR).unwrap();
+    std::fs::write(dir.path().join("residuals.csv"), residuals).unwrap();
+    for size in [[1024.0, 768.0], [1440.0, 900.0]] {
+        let mut window = sized_window(size[0], size[1]);
+        open(&mut window, dir.path());
+        settled(&mut window);
+        let mut moved = 0;
+        for n in 0..directions as usize {
+            window.state_mut().go(n);
+            settled(&mut window);
+            window.run_steps(3);
+            assert_eq!(answer(&window).0, Status::Ok, "{n}");
+            let picture = window.get_by_label(&format!("Picture {n}.png")).rect();
+            let (map, words) = (map(&window), place_of(&window, |text| text.starts_with("axis, ")));
+            assert!(picture.contains_rect(map) && picture.contains_rect(words), "{n}: {map:?} {words:?}");
+            assert!(!map.intersects(words), "{n}: {map:?} {words:?}");
+            let label = place_of(&window, |text| text.contains("1 residuals, enlarged"));
+            assert!(!label.intersects(map) && !label.intersects(words), "{n}: {label:?} {map:?} {words:?}");
+            moved += usize::from(map.center().y > picture.center().y);
+        }
+        assert!(moved > 0 && moved < directions as usize, "only some arrows are in the way: {moved}");
+    }
 }
 
 const LAST_LINE: &str = "Pictures whose status differs";

@@ -8,7 +8,7 @@ use egui_kittest::kittest::Queryable;
 use hzn_sim::flight::rocket;
 use hzn_viewer::model::settings::Layer;
 
-use super::window::{flight, folder, settled, window_on};
+use super::window::{flight, folder, painted, settled, window_on};
 
 /// Writes a rendered flight with positions, and with attitudes if they are wanted.
 fn write(folder: &Path, has_attitude: bool) {
@@ -46,6 +46,28 @@ fn latitudes_and_longitudes_need_a_position_and_an_attitude() {
         let grid = window.state().frame_view().unwrap().grid().map(|grid| grid.parallels.len());
         assert_eq!(grid.is_some_and(|n| n > 0), has_attitude, "{grid:?}");
     }
+}
+
+#[test]
+fn the_local_vertical_of_a_comparison_lies_below_the_names() {
+    let dir = tempfile::tempdir().unwrap();
+    write(dir.path(), true);
+    let mut window = window_on(dir.path());
+    window.state_mut().settings_mut().show(Layer::Vertical, true);
+    window.key_press(Key::X);
+    settled(&mut window);
+    window.run_steps(3);
+    let texts = painted(&window);
+    for (pane, title) in window.query_all_by_label_contains("Picture rocket").zip(["this sensor.toml", "preset "]) {
+        let within = |is_it: &dyn Fn(&str) -> bool| {
+            let place = texts.iter().find(|(text, place)| is_it(text) && pane.rect().contains_rect(*place));
+            place.unwrap_or_else(|| panic!("{title}: {texts:?}")).1
+        };
+        let (name, vertical) =
+            (within(&|text| text.starts_with(title)), within(&|text| text.starts_with("elevation ")));
+        assert!(name.bottom() < vertical.top(), "{name:?} {vertical:?}");
+    }
+    assert_eq!(window.query_all_by_label_contains("Picture rocket").count(), 2);
 }
 
 #[test]

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use egui::{Key, Modifiers, Role};
+use egui::epaint::Shape;
+use egui::{Key, Modifiers, Rect, Role};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use hzn_core::camera::{Camera, Config, Model};
@@ -40,19 +41,24 @@ altitude_km = 240.0
 scale = 1.0     # times Otsu's level
 ";
 
+/// Returns a picture of a limb with a soft edge around an axis in the camera frame.
+pub(crate) fn limb(axis: [f64; 3]) -> image::GrayImage {
+    let camera = Camera::<f64>::try_new(&Config::ideal(Model::Pinhole, WIDTH, HEIGHT, 260.0)).unwrap();
+    image::GrayImage::from_fn(WIDTH.into(), HEIGHT.into(), |x, y| {
+        let ray = camera.unproject(ImagePoint { u: x.into(), v: y.into() }).unwrap().xyz();
+        let cos: f64 = ray.iter().zip(axis).map(|(a, b)| a * b).sum();
+        let inside_px = (HALF_ANGLE.asin() - cos.clamp(-1.0, 1.0).acos()) * 260.0;
+        image::Luma([(8.0 + 190.0 / (1.0 + (-inside_px / 0.6).exp())) as u8])
+    })
+}
+
 /// Writes pictures of a limb with a soft edge, which turns from picture to picture. The last picture is dark.
 pub(crate) fn flight(folder: &Path) {
-    let camera = Camera::<f64>::try_new(&Config::ideal(Model::Pinhole, WIDTH, HEIGHT, 260.0)).unwrap();
     for frame in 0..4 {
         let (pitch, roll) = (1.15 + 0.03 * f64::from(frame), 0.1 * f64::from(frame));
         let axis = [pitch.sin() * roll.sin(), pitch.sin() * roll.cos(), pitch.cos()];
-        let picture = image::GrayImage::from_fn(WIDTH.into(), HEIGHT.into(), |x, y| {
-            let ray = camera.unproject(ImagePoint { u: x.into(), v: y.into() }).unwrap().xyz();
-            let cos: f64 = ray.iter().zip(axis).map(|(a, b)| a * b).sum();
-            let inside_px = (HALF_ANGLE.asin() - cos.clamp(-1.0, 1.0).acos()) * 260.0;
-            let light = 1.0 / (1.0 + (-inside_px / 0.6).exp());
-            image::Luma([if frame == 3 { 4 } else { (8.0 + 190.0 * light) as u8 }])
-        });
+        let dark = || image::GrayImage::from_pixel(WIDTH.into(), HEIGHT.into(), image::Luma([4]));
+        let picture = if frame == 3 { dark() } else { limb(axis) };
         picture.save(folder.join(format!("{frame}.png"))).unwrap();
     }
     std::fs::write(folder.join("sensor.toml"), SENSOR).unwrap();
@@ -162,6 +168,18 @@ pub(crate) fn type_path(window: &mut Window, path: &Path) {
     window.run_steps(2);
 }
 
+/// Types a number into a field, and leaves the field.
+pub(crate) fn type_number(window: &mut Window, field: &str, text: &str) {
+    window.get_by_role_and_label(Role::SpinButton, field).focus();
+    window.run_steps(3);
+    window.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    window.run_steps(2);
+    window.event(egui::Event::Text(text.to_owned()));
+    window.run_steps(2);
+    window.key_press(Key::Enter);
+    window.run_steps(3);
+}
+
 /// Agrees to replace a file that exists.
 pub(crate) fn replace(window: &mut Window) {
     window.get_by_label("Replace").click();
@@ -238,6 +256,33 @@ pub(crate) fn files(folder: &Path) -> Vec<String> {
 
 pub(crate) fn frame_view(window: &Window) -> &FrameView {
     window.state().frame_view().unwrap()
+}
+
+/// Returns all texts that are painted, with their places.
+pub(crate) fn painted(window: &Window) -> Vec<(String, Rect)> {
+    fn collect(shape: &Shape, clip: Rect, out: &mut Vec<(String, Rect)>) {
+        match shape {
+            Shape::Vec(all) => all.iter().for_each(|one| collect(one, clip, out)),
+            Shape::Text(text) => {
+                let rect = text.visual_bounding_rect();
+                if clip.intersects(rect) {
+                    out.push((text.galley.text().to_owned(), rect));
+                }
+            }
+            _ => {}
+        }
+    }
+    let mut out = Vec::new();
+    for clipped in &window.output().shapes {
+        collect(&clipped.shape, clipped.clip_rect, &mut out);
+    }
+    out
+}
+
+/// Returns the place of the first painted text that is looked for.
+pub(crate) fn place_of(window: &Window, is_it: impl Fn(&str) -> bool) -> Rect {
+    let texts = painted(window);
+    texts.iter().find(|(text, _)| is_it(text)).unwrap_or_else(|| panic!("not painted: {texts:?}")).1
 }
 
 /// Returns status, threshold and axis of the shown picture.

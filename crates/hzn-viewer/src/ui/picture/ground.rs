@@ -2,7 +2,6 @@
 
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, vec2};
 
-use super::read_out::label;
 use super::strokes::{cross, lines};
 use crate::model::settings::Layer;
 use crate::ui::placement::Placement;
@@ -15,14 +14,14 @@ use crate::work::ground::{NamedLine, Vertical, vertical};
 /// Shortest part of a line that has a label, in points.
 const LABELLED: f32 = 60.0;
 
-/// Draws the layers that are switched on.
+/// Draws the layers that are switched on. Returns what the local vertical says about the camera.
 pub(super) fn draw(
     viewer: &Viewer,
     painter: &Painter,
     frame_view: &FrameView,
     outcome: &Outcome,
     placement: &Placement<'_>,
-) {
+) -> Option<String> {
     let mut taken = Vec::new();
     if viewer.settings.shows(Layer::Grid)
         && let Some(grid) = frame_view.grid()
@@ -44,15 +43,13 @@ pub(super) fn draw(
             }
         }
     }
-    if viewer.settings.shows(Layer::Vertical)
-        && let Some(camera) = placement.camera
-    {
-        let axis = viewer.answer().and_then(|a| a.solution()).map(|s| s.axis.xyz());
-        let figure_km = outcome.config.body.figure_km();
-        if let Some(level) = vertical(frame_view.data.as_ref(), figure_km, axis, camera) {
-            draw_vertical(painter, placement, &level, &mut taken);
-        }
-    }
+    let camera = placement.camera.filter(|_| viewer.settings.shows(Layer::Vertical))?;
+    let axis = viewer.answer().and_then(|a| a.solution()).map(|s| s.axis.xyz());
+    let level = vertical(frame_view.data.as_ref(), outcome.config.body.figure_km(), axis, camera)?;
+    draw_vertical(painter, placement, &level, &mut taken);
+    let source = if level.is_measured { "measured axis" } else { "given attitude" };
+    let roll = level.roll_deg.map_or(String::new(), |deg| format!(", roll {deg:+.2}°"));
+    Some(format!("elevation {:+.2}°{roll} ({source})", level.elevation_deg))
 }
 
 fn draw_vertical(painter: &Painter, placement: &Placement<'_>, level: &Vertical, taken: &mut Vec<Rect>) {
@@ -65,11 +62,6 @@ fn draw_vertical(painter: &Painter, placement: &Placement<'_>, level: &Vertical,
         cross(painter, at, 11.0, Stroke::new(2.0, theme::VERTICAL));
         name(painter, at + vec2(14.0, 10.0), "nadir", theme::VERTICAL, taken);
     }
-    let source = if level.is_measured { "measured axis" } else { "given attitude" };
-    let roll = level.roll_deg.map_or(String::new(), |deg| format!(", roll {deg:+.2}°"));
-    let text = format!("elevation {:+.2}°{roll} ({source})", level.elevation_deg);
-    let corner = painter.clip_rect().left_top() + vec2(10.0, 10.0);
-    label(painter, corner, Align2::LEFT_TOP, &text);
 }
 
 /// Draws a line with its name at a part of its longest piece.

@@ -4,9 +4,7 @@ use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2, po
 use hzn_core::camera::Camera;
 use hzn_core::pixel::ImagePoint;
 
-use super::arrow::Arrow;
 use crate::model::settings::Layer;
-use crate::ui::placement::Placement;
 use crate::ui::theme;
 use crate::ui::viewer::Viewer;
 use crate::work::FrameView;
@@ -23,14 +21,14 @@ const BADGE_HEIGHT: f32 = 30.0;
 const SIDE: usize = 24;
 const AROUND: usize = 120;
 
-/// Draws the map in a corner, if the axis of the answer lies outside the picture. The distance from its centre is the
-/// angle from the optical axis.
+/// Draws the map in a corner, if the axis of the answer lies outside the picture, and adds its place to what is taken.
+/// The distance from its centre is the angle from the optical axis.
 pub(super) fn draw(
     viewer: &Viewer,
     painter: &Painter,
     frame_view: &FrameView,
     outcome: &Outcome,
-    placement: &Placement<'_>,
+    taken: &mut Vec<Rect>,
 ) {
     let body = outcome.bodies.get(viewer.body).or(outcome.bodies.first());
     let (Some(body), Some(camera), Some(size)) = (body, frame_view.camera.as_deref(), frame_view.size()) else {
@@ -40,8 +38,8 @@ pub(super) fn draw(
     if !viewer.settings.shows(Layer::Axis) || body.axis.is_some_and(inside) {
         return;
     }
-    let arrow = Arrow::new(painter, placement, body);
-    let Some(map) = Map::new(body, camera, painter.clip_rect(), arrow.map(|arrow| arrow.area())) else { return };
+    let Some(map) = Map::new(body, camera, painter.clip_rect(), taken) else { return };
+    taken.push(map.frame);
     painter.rect_filled(map.frame, 6, Color32::from_black_alpha(200));
     let painter = painter.with_clip_rect(map.frame);
     for degrees in [30, 60, 90, 120, 150] {
@@ -74,7 +72,7 @@ struct Map {
 }
 
 impl Map {
-    fn new(body: &BodyResult, camera: &Camera<f64>, rect: Rect, taken: Option<Rect>) -> Option<Self> {
+    fn new(body: &BodyResult, camera: &Camera<f64>, rect: Rect, taken: &[Rect]) -> Option<Self> {
         let s = body.solution()?;
         let off_deg = s.axis.xyz()[2].clamp(-1.0, 1.0).acos().to_degrees();
         let far_deg = off_deg + s.fused_half_angle_rad.to_degrees();
@@ -98,12 +96,12 @@ impl Map {
     }
 }
 
-/// Returns the corner of the map: the upper right one, or the lower right one if the arrow to the axis is in the way.
-fn place(size: Vec2, rect: Rect, taken: Option<Rect>) -> Rect {
+/// Returns the corner of the map: the upper right one, or the lower right one if an arrow to an axis is in the way.
+fn place(size: Vec2, rect: Rect, taken: &[Rect]) -> Rect {
     let upper = Rect::from_min_size(pos2(rect.right() - size.x - 10.0, rect.top() + 10.0), size);
     // The badge of the zoom is below the lower one.
     let lower = upper.translate(vec2(0.0, (rect.height() - size.y - 20.0 - BADGE_HEIGHT).max(0.0)));
-    if taken.is_some_and(|taken| taken.intersects(upper)) { lower } else { upper }
+    if taken.iter().any(|taken| taken.intersects(upper)) { lower } else { upper }
 }
 
 /// Returns the border of the picture. A pixel outside the image circle has no direction.
@@ -142,11 +140,11 @@ mod tests {
     #[test]
     fn the_map_gives_way_to_the_arrow() {
         let (rect, size) = (Rect::from_min_size(pos2(200.0, 40.0), vec2(790.0, 520.0)), vec2(170.0, 184.0));
-        let upper = place(size, rect, None);
+        let upper = place(size, rect, &[]);
         assert!(rect.contains_rect(upper) && upper.top() == 50.0);
-        assert_eq!(place(size, rect, Some(Rect::from_min_size(pos2(300.0, 100.0), vec2(40.0, 40.0)))), upper);
+        assert_eq!(place(size, rect, &[Rect::from_min_size(pos2(300.0, 100.0), vec2(40.0, 40.0))]), upper);
         let taken = Rect::from_min_size(pos2(780.0, 160.0), vec2(200.0, 20.0));
-        let lower = place(size, rect, Some(taken));
+        let lower = place(size, rect, &[taken]);
         assert!(rect.contains_rect(lower) && !lower.intersects(taken), "{lower:?}");
     }
 

@@ -1,8 +1,8 @@
 //! The residuals of a lens calibration: an arrow from each measured point, all enlarged by the same factor.
 
-use egui::{Align2, Painter, Pos2, Stroke, vec2};
+use egui::{Align2, Painter, Pos2, Rect, Stroke};
 
-use super::read_out::label;
+use super::read_out::corner_label;
 use crate::model::settings::Layer;
 use crate::model::view::Point;
 use crate::ui::placement::Placement;
@@ -13,8 +13,14 @@ use crate::work::FrameView;
 /// Length of an arrow of the RMS, as a part of the width of the picture.
 const LENGTH: f64 = 0.02;
 
-/// Draws the arrows, if there are residuals and their overlay is switched on.
-pub(super) fn draw(viewer: &Viewer, painter: &Painter, frame_view: &FrameView, placement: &Placement<'_>) {
+/// Draws the arrows, if there are residuals and their overlay is switched on. Their label avoids what is taken.
+pub(super) fn draw(
+    viewer: &Viewer,
+    painter: &Painter,
+    frame_view: &FrameView,
+    placement: &Placement<'_>,
+    taken: &mut Vec<Rect>,
+) {
     let Some(residuals) = &viewer.companions.residuals else { return };
     if !viewer.settings.shows(Layer::Lens) || viewer.layers_hidden {
         return;
@@ -50,6 +56,5 @@ pub(super) fn draw(viewer: &Viewer, painter: &Painter, frame_view: &FrameView, p
         arrows.len(),
         residuals.rms_px
     );
-    let rect = painter.clip_rect();
-    label(painter, rect.right_top() + vec2(-10.0, 10.0), Align2::RIGHT_TOP, &text);
+    corner_label(painter, Align2::RIGHT_TOP, &text, taken);
 }

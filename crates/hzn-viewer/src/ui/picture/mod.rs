@@ -23,7 +23,7 @@ use crate::model::Plane;
 use crate::model::View;
 use crate::model::settings::Layer;
 use crate::work::FrameView;
-use read_out::{label, notice};
+use read_out::{corner_label, label, notice};
 
 /// Room in points for the badge of the zoom, which has up to six characters.
 const BADGE: f32 = 80.0;
@@ -77,17 +77,7 @@ fn show_pane(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, rect: Rec
     draw_pixels(viewer, &painter, &placement, pane);
     read_out::values(&painter, frame_view, &placement, rect);
     let outcome = frame_view.answers.get(pane);
-    if let Some(outcome) = outcome.filter(|_| !viewer.layers_hidden) {
-        overlays::draw(viewer, &painter, frame_view, outcome, &placement);
-        inset::draw(viewer, &painter, frame_view, outcome, &placement);
-    }
-    if pane == 0 {
-        draw_tools(viewer, ui, &painter, frame_view, &placement);
-    }
-    if let Some(name) = viewer.other.as_ref().map(|(name, _)| name.clone()) {
-        let title = if pane == 0 { compare::OURS.to_owned() } else { name };
-        label(&painter, rect.left_top() + vec2(10.0, 10.0), Align2::LEFT_TOP, &title);
-    }
+    draw_layers(viewer, ui, &painter, frame_view, &placement, pane);
     if let Some(refused) = outcome.and_then(|o| o.refused.as_deref()) {
         notice(&painter, rect, refused, ui.visuals().warn_fg_color);
     }
@@ -103,6 +93,33 @@ fn show_pane(viewer: &mut Viewer, ui: &mut Ui, frame_view: &FrameView, rect: Rec
         let foot = reaching.map_or(rect.bottom(), |text| text.top());
         let at = pos2(rect.right() - 10.0, foot - 10.0);
         label(&painter, at, Align2::RIGHT_BOTTOM, &format!("{percent:.0} %"));
+    }
+}
+
+/// Draws the overlays, the tools of the first pane, and the labels in the upper corners.
+fn draw_layers(
+    viewer: &Viewer,
+    ui: &Ui,
+    painter: &egui::Painter,
+    frame_view: &FrameView,
+    placement: &Placement<'_>,
+    pane: usize,
+) {
+    // Texts that are placed later avoid these places.
+    let mut taken = Vec::new();
+    let mut vertical = None;
+    if let Some(outcome) = frame_view.answers.get(pane).filter(|_| !viewer.layers_hidden) {
+        vertical = overlays::draw(viewer, painter, frame_view, outcome, placement, &mut taken);
+        inset::draw(viewer, painter, frame_view, outcome, &mut taken);
+    }
+    let compared = viewer.other.as_ref().map(|(name, _)| if pane == 0 { compare::OURS } else { name.as_str() });
+    for text in compared.into_iter().chain(vertical.as_deref()) {
+        corner_label(painter, Align2::LEFT_TOP, text, &mut taken);
+    }
+    if pane == 0 {
+        lens::draw(viewer, painter, frame_view, placement, &mut taken);
+        mask::draw(viewer, painter, placement, ui);
+        circle::draw(viewer, painter, placement);
     }
 }
 
@@ -124,13 +141,6 @@ fn draw_pixels(viewer: &Viewer, painter: &egui::Painter, placement: &Placement<'
     {
         painter.image(touched.id(), at, uv, theme::TOUCHED);
     }
-}
-
-/// Draws the residuals of a calibration and the tools of mask and image circle.
-fn draw_tools(viewer: &Viewer, ui: &Ui, painter: &egui::Painter, frame_view: &FrameView, placement: &Placement<'_>) {
-    lens::draw(viewer, painter, frame_view, placement);
-    mask::draw(viewer, painter, placement, ui);
-    circle::draw(viewer, painter, placement);
 }
 
 /// Handles zoom and pan, or the tool of the mask or of the image circle. Returns true if the view has changed.

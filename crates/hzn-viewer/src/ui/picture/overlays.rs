@@ -15,14 +15,16 @@ use crate::ui::viewer::Viewer;
 use crate::work::frame_view::{BodyResult, Outcome};
 use crate::work::{FrameView, sky, stars};
 
-/// Draws all layers that are switched on.
+/// Draws all layers that are switched on, and adds the places of arrows to what is taken. Returns what the local
+/// vertical says about the camera.
 pub(super) fn draw(
     viewer: &Viewer,
     painter: &Painter,
     frame_view: &FrameView,
     outcome: &Outcome,
     placement: &Placement<'_>,
-) {
+    taken: &mut Vec<Rect>,
+) -> Option<String> {
     let on = |layer| viewer.settings.shows(layer);
     if on(Layer::Mask) {
         for polygon in &outcome.config.mask.polygons_px {
@@ -42,9 +44,9 @@ pub(super) fn draw(
             dashed_ellipse(painter, ellipse, placement);
         }
     }
-    ground::draw(viewer, painter, frame_view, outcome, placement);
+    let vertical = ground::draw(viewer, painter, frame_view, outcome, placement);
     for answer in &outcome.bodies {
-        body(viewer, painter, answer, placement);
+        taken.extend(body(viewer, painter, answer, placement));
     }
     if on(Layer::Truth) {
         for truth in viewer.truth.get(&frame_view.name).into_iter().flatten() {
@@ -56,28 +58,34 @@ pub(super) fn draw(
             }
         }
     }
-    if on(Layer::Sky)
-        && let Some(camera) = placement.camera
-    {
-        let truth = viewer.truth.get(&frame_view.name).and_then(|t| t.first());
-        for place in sky::places(frame_view.data.as_ref(), truth, &outcome.bodies, camera) {
-            let Some(at) = placement.to_screen(place.at) else { continue };
-            let colour = theme::SKY.gamma_multiply(if place.is_hidden { 0.5 } else { 1.0 });
-            painter.circle_stroke(at, 11.0, Stroke::new(1.5, colour));
-            painter.text(at + vec2(14.0, 0.0), Align2::LEFT_CENTER, place.name, FontId::proportional(12.0), colour);
-        }
-        for star in stars::places(frame_view.data.as_ref(), &outcome.bodies, camera) {
-            let Some(at) = placement.to_screen(star.at) else { continue };
-            // A bright star has a larger circle.
-            let radius = (7.0 - 1.3 * star.magnitude as f32).clamp(3.0, 9.0);
-            painter.circle_stroke(at, radius, Stroke::new(1.0, theme::SKY));
-            let (font, colour) = (FontId::proportional(11.0), theme::SKY.gamma_multiply(0.85));
-            painter.text(at + vec2(radius + 3.0, 0.0), Align2::LEFT_CENTER, star.name, font, colour);
-        }
+    if on(Layer::Sky) {
+        draw_sky(viewer, painter, frame_view, outcome, placement);
+    }
+    vertical
+}
+
+/// Draws Sun, Moon and stars with their names.
+fn draw_sky(viewer: &Viewer, painter: &Painter, frame_view: &FrameView, outcome: &Outcome, placement: &Placement<'_>) {
+    let Some(camera) = placement.camera else { return };
+    let truth = viewer.truth.get(&frame_view.name).and_then(|t| t.first());
+    for place in sky::places(frame_view.data.as_ref(), truth, &outcome.bodies, camera) {
+        let Some(at) = placement.to_screen(place.at) else { continue };
+        let colour = theme::SKY.gamma_multiply(if place.is_hidden { 0.5 } else { 1.0 });
+        painter.circle_stroke(at, 11.0, Stroke::new(1.5, colour));
+        painter.text(at + vec2(14.0, 0.0), Align2::LEFT_CENTER, place.name, FontId::proportional(12.0), colour);
+    }
+    for star in stars::places(frame_view.data.as_ref(), &outcome.bodies, camera) {
+        let Some(at) = placement.to_screen(star.at) else { continue };
+        // A bright star has a larger circle.
+        let radius = (7.0 - 1.3 * star.magnitude as f32).clamp(3.0, 9.0);
+        painter.circle_stroke(at, radius, Stroke::new(1.0, theme::SKY));
+        let (font, colour) = (FontId::proportional(11.0), theme::SKY.gamma_multiply(0.85));
+        painter.text(at + vec2(radius + 3.0, 0.0), Align2::LEFT_CENTER, star.name, font, colour);
     }
 }
 
-fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Placement<'_>) {
+/// Draws the result of a body. Returns the place of the arrow to an axis outside of the picture.
+fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Placement<'_>) -> Option<Rect> {
     let on = |layer| viewer.settings.shows(layer);
     let dot = (placement.scale() as f32 * 0.5).clamp(0.9, 5.0);
     if on(Layer::Edges) {
@@ -118,12 +126,15 @@ fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Pla
         dots(painter, points(true), dot, theme::INLIER);
     }
     let inside = |p: &Point| (0..2).all(|i| (-0.5..placement.size[i] - 0.5).contains(&p[i]));
-    if on(Layer::Axis) && answer.axis.filter(inside).is_none() {
-        Arrow::new(painter, placement, answer).iter().for_each(|arrow| arrow.draw(painter));
+    if !on(Layer::Axis) {
+        return None;
     }
-    if on(Layer::Axis)
-        && let Some(at) = answer.axis.filter(inside).and_then(|p| placement.to_screen(p))
-    {
+    if answer.axis.filter(inside).is_none() {
+        let arrow = Arrow::new(painter, placement, answer)?;
+        arrow.draw(painter);
+        return Some(arrow.area());
+    }
+    if let Some(at) = answer.axis.filter(inside).and_then(|p| placement.to_screen(p)) {
         cross(painter, at, 13.0, Stroke::new(4.0, Color32::from_black_alpha(140)));
         cross(painter, at, 12.0, Stroke::new(2.0, theme::AXIS));
         let outline: Vec<Pos2> = answer.ellipse.iter().filter_map(|p| placement.to_screen(*p)).collect();
@@ -131,6 +142,7 @@ fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Pla
             painter.add(Shape::closed_line(outline, Stroke::new(1.5, theme::AXIS)));
         }
     }
+    None
 }
 
 /// Draws lines with dashes, above a dark line that keeps them visible on clouds.

@@ -12,6 +12,10 @@ use crate::work::residuals::Residual;
 /// Scale from which single pixels show their values, in screen points per picture pixel.
 const VALUES_FROM: f64 = 34.0;
 
+/// Distance of the labels from the corners of the picture, and between them, in screen points.
+const CORNER: f32 = 10.0;
+const GAP: f32 = 4.0;
+
 /// Largest distance of the pointer from a rejected point that is described, in screen points.
 const REJECTED_REACH: f64 = 6.0;
 
@@ -77,12 +81,31 @@ pub(super) fn under_pointer(
 
 /// Draws text on a background that makes it readable on every picture, and returns its place.
 pub(super) fn label(painter: &Painter, at: Pos2, align: Align2, text: &str) -> Rect {
+    label_beside(painter, at, align, text, &[])
+}
+
+/// Draws a text like [`label`] in a corner at the top, below what is in its way, and adds its place to what is taken.
+pub(super) fn corner_label(painter: &Painter, align: Align2, text: &str, taken: &mut Vec<Rect>) {
+    let at = align.pos_in_rect(&painter.clip_rect().shrink(CORNER));
+    let place = label_beside(painter, at, align, text, taken);
+    taken.push(place);
+}
+
+fn label_beside(painter: &Painter, at: Pos2, align: Align2, text: &str, taken: &[Rect]) -> Rect {
     let width = painter.clip_rect().width() - 30.0;
     let galley = painter.layout(text.to_owned(), FontId::proportional(12.5), Color32::from_rgb(236, 238, 242), width);
-    let rect = align.anchor_size(at, galley.size() + vec2(14.0, 8.0));
+    let rect = below(align.anchor_size(at, galley.size() + vec2(14.0, 8.0)), taken);
     painter.rect_filled(rect, 5, Color32::from_black_alpha(190));
     painter.galley(rect.min + vec2(7.0, 4.0), galley, Color32::WHITE);
     rect
+}
+
+/// Moves a place down until it meets nothing that is taken.
+fn below(mut place: Rect, taken: &[Rect]) -> Rect {
+    while let Some(other) = taken.iter().find(|other| other.intersects(place)) {
+        place = place.translate(vec2(0.0, other.bottom() + GAP - place.top()));
+    }
+    place
 }
 
 /// Draws an error message across the middle of the picture.
@@ -91,4 +114,25 @@ pub(super) fn notice(painter: &Painter, rect: Rect, text: &str, colour: Color32)
     let place = Align2::CENTER_CENTER.anchor_size(rect.center(), galley.size() + vec2(24.0, 16.0));
     painter.rect_filled(place, 6, Color32::from_black_alpha(210));
     painter.galley(place.min + vec2(12.0, 8.0), galley, colour);
+}
+
+#[cfg(test)]
+mod tests {
+    use egui::pos2;
+
+    use super::*;
+
+    #[test]
+    fn labels_of_one_corner_stand_below_each_other() {
+        let size = vec2(200.0, 24.0);
+        let mut taken = vec![Rect::from_min_size(pos2(300.0, 10.0), vec2(170.0, 184.0))];
+        for top in [10.0, 38.0, 66.0] {
+            let place = below(Rect::from_min_size(pos2(10.0, 10.0), size), &taken);
+            assert_eq!((place.top(), place.size()), (top, size));
+            taken.push(place);
+        }
+        // A text that would reach the map goes below it.
+        let wide = below(Rect::from_min_size(pos2(220.0, 10.0), size), &taken);
+        assert!(wide.top() > 194.0 && taken.iter().all(|other| !other.intersects(wide)), "{wide:?}");
+    }
 }
