@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use crate::machine::{has, root, target};
-use crate::steps::{self, Trouble, show};
+use crate::steps::{self, Trouble};
 use crate::test_build::build_tests;
 
 /// The photograph of the demo with its sensor, whose printed answer stands below the picture on the first page.
@@ -70,9 +70,11 @@ fn make() -> Result<(), Trouble> {
     reduce(&folder.join("camera-map.png"), "camera-map")
 }
 
-/// Copies a photograph and its sensor below the folder, and draws its picture there.
+/// Copies a photograph, its sensor, and the table of altitudes and attitudes beside it below the folder, and draws its
+/// picture there.
 fn photograph(folder: &Path, files: [&Path; 2], name: &str) -> Result<(), Trouble> {
-    for file in files {
+    let table = files[0].with_file_name("frames.csv");
+    for file in files.into_iter().chain(table.exists().then_some(table.as_path())) {
         let copy = folder.join(file);
         fs::create_dir_all(copy.parent().unwrap_or(folder))?;
         fs::copy(file, copy)?;
@@ -88,9 +90,8 @@ fn hzn(folder: &Path, args: &[&str], name: &str) -> Result<(), Trouble> {
     let drawn = folder.join(&file);
     let mut command = Command::new(target().join("debug/hzn"));
     command.current_dir(folder).args(args).args(["--overlay", &file]).arg("--force").stdout(Stdio::null());
-    show(&command);
-    // A refused picture has an overlay, too.
-    command.status()?;
+    // A picture that was processed and refused has an overlay and no error. One that lacks an altitude is an error.
+    steps::run(&mut command)?;
     reduce(&drawn, name)
 }
 
