@@ -11,15 +11,10 @@ h1{font-size:1.5rem}td{padding:.2rem .8rem;border-bottom:1px solid #eee}\
 .plots{display:grid;gap:1rem;grid-template-columns:repeat(auto-fit,minmax(420px,1fr))}.plots \
 svg{width:100%;height:auto}";
 
-/// Rules of style for a reader whose system is dark, after all others. Drawings have their colours as attributes, which
-/// these rules replace.
+/// Rules of style for a reader whose system is dark, after all others. Drawings have their own.
 pub(crate) const DARK: &str = "@media(prefers-color-scheme:dark){:root{color-scheme:dark}\
 body{background:#15171b;color:#dde1e6}td,th,h2{border-color:#33383f}.sub,figcaption{color:#9aa3ad}\
-.warning{background:#3d3216}.plots svg{border-color:#33383f}\
-svg rect[fill=\"#FFFFFF\"],svg rect[fill=\"#fafafa\"]{fill:#1c1f24}svg text{fill:#dde1e6}\
-svg [stroke=\"#000000\"],svg [stroke=\"#444\"]{stroke:#9aa3ad}\
-svg [stroke=\"#0072B2\"]{stroke:#56b4e9}svg [fill=\"#0072B2\"]{fill:#56b4e9}\
-svg [stroke=\"#3C3C3C\"]{stroke:#c8ced6}svg [fill=\"#3C3C3C\"]{fill:#c8ced6}}";
+.warning{background:#3d3216}.plots svg{border-color:#33383f}}";
 
 /// Escapes a text for HTML, also within an attribute.
 pub(crate) fn escape(text: &str) -> String {

@@ -1,5 +1,6 @@
 //! Charts as SVG: lines and dots over two axes.
 
+mod dark;
 mod error;
 
 use std::io;
@@ -8,6 +9,7 @@ use std::ops::Range;
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 
+pub use dark::{DARK, with_dark};
 pub use error::{Error, Kind};
 
 /// The colours of Okabe and Ito, in the order in which they are used. Colour-blind people can distinguish them.
@@ -108,7 +110,7 @@ impl Chart {
         self
     }
 
-    /// Returns the chart as SVG text.
+    /// Returns the chart as SVG text, with dark colours for a system that is dark.
     ///
     /// # Errors
     /// There is nothing to draw: no point is finite.
@@ -135,7 +137,7 @@ impl Chart {
         let mut out = String::new();
         self.draw_onto(SVGBackend::with_string(&mut out, self.size), x.0..x.1, y)
             .map_err(|e| Error::new(&self.title, Kind::Drawing(e)))?;
-        Ok(out)
+        Ok(with_dark(&out))
     }
 
     fn draw_onto<'a>(&'a self, backend: SVGBackend<'a>, x: Range<f64>, y: Range<f64>) -> Drawn {
@@ -169,7 +171,7 @@ impl Chart {
             .y_desc(&self.y)
             .axis_desc_style(font(14))
             .label_style(font(12))
-            .light_line_style(WHITE)
+            .light_line_style(TRANSPARENT)
             .bold_line_style(BLACK.mix(0.1))
             .x_label_formatter(&|v| number(*v))
             .y_label_formatter(&|v| number(*v))

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::common::{Place, assert_provenance};
+use crate::dark::assert_drawings_are_readable;
 
 /// Real pictures of a board with 9 × 6 inner corners.
 const BOARDS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/boards");
@@ -51,6 +52,7 @@ fn real_boards_give_a_camera() {
     // The pictures of a board belong to no sensor yet.
     assert_provenance(&page, false, "hzn calibrate board");
     assert!(page.contains("<svg") && page.contains("left14.jpg") && page.contains("1 sigma of the radial curve"));
+    assert!(assert_drawings_are_readable(&page) > 13 * 54, "an arrow for each corner");
     let table = hzn_calib::residual_table::read(&place.path("residuals.csv")).unwrap();
     let counts: Vec<_> = table.iter().filter(|(_, r)| r.counts).collect();
     let rms = (counts.iter().map(|(_, r)| r.error_px[0].powi(2) + r.error_px[1].powi(2)).sum::<f64>()

@@ -1,6 +1,7 @@
 //! `hzn evaluate` on a few pictures whose truth is known by construction.
 
 use crate::common::{Place, SENSOR, assert_provenance};
+use crate::dark::assert_drawings_are_readable;
 
 const HEADER: &str = "file,time_s,body,limb,axis_x,axis_y,axis_z,half_angle_deg,altitude_km,sun_x,sun_y,sun_z,moon_x,\
                       moon_y,moon_z,qw,qx,qy,qz\n";
@@ -59,6 +60,7 @@ fn a_run_against_its_truth_as_text_json_and_page() {
     let sensor = facts["sensor_hash"].as_str().unwrap();
     assert!(page.contains(&format!("sensor {sensor}, {command}")), "the sensor of the recording is named");
     assert!(page.contains("prefers-color-scheme:dark"), "the page has dark colours");
+    assert!(assert_drawings_are_readable(&page) > 100);
     assert!(page.matches("<svg").count() >= 4 && page.contains("data:image/jpeg;base64,"));
     // The Stanford diagram as picture and table.
     for text in ["below the line: misleading", "<td>above 1: misleading</td><td>0</td><td>0</td>"] {
@@ -88,6 +90,7 @@ fn missed_and_false_answers_are_the_worst_frames() {
     assert_eq!(worst.len(), 2);
     // The charts mark the picture that shows the limb and has no answer.
     assert!(place.read("lies.html").contains("no answer (1)"));
+    assert_drawings_are_readable(&place.read("lies.html"));
 }
 
 #[test]

@@ -8,6 +8,7 @@ use hzn_sim::Scenario;
 
 use crate::ccsds;
 use crate::common::assert_provenance;
+use crate::dark::assert_drawings_are_readable;
 
 /// Directions without errors that claim 0.05°.
 struct Exact;
@@ -133,7 +134,9 @@ fn the_whole_flight_is_solved_at_once() {
     }
     assert!(!stderr.contains("did not converge"), "{stderr}");
     // The tables of the heads do not say which sensor made them.
-    assert_provenance(&std::fs::read_to_string(at.join("nav.html")).unwrap(), false, "hzn fuse");
+    let page = std::fs::read_to_string(at.join("nav.html")).unwrap();
+    assert_provenance(&page, false, "hzn fuse");
+    assert_drawings_are_readable(&page);
     let ((filter, filter_m), (solve, solve_m)) = (told_errors(&stdout, "filter"), told_errors(&stdout, "solve"));
     let norm = |e: [f64; 3]| e.iter().map(|x| x * x).sum::<f64>().sqrt();
     assert!(norm(solve) < 0.8 * norm(filter) && solve_m < filter_m, "{solve:?} {filter:?} {solve_m} {filter_m}");

@@ -17,6 +17,7 @@ mod conventions;
 #[cfg(target_os = "linux")] // where the program keeps the names of its functions
 mod copies;
 mod corners;
+mod dark;
 mod documents;
 mod doubts;
 mod evaluate;

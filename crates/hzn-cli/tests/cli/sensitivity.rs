@@ -1,6 +1,7 @@
 //! Tests of `hzn sensitivity`: tables, plots, and messages about impossible designs.
 
 use crate::common::{Place, cell, rows};
+use crate::dark::assert_drawings_are_readable;
 
 #[test]
 fn a_sweep_as_text_table_and_plot() {
@@ -35,6 +36,7 @@ fn a_sweep_as_text_table_and_plot() {
     }
     let svg = place.read("s.svg");
     assert!(svg.starts_with("<svg") && svg.contains("field of view [deg]") && svg.contains("pitch, fused"));
+    assert_drawings_are_readable(&svg);
     place.run(&sweep).expect(2).says("s.csv: exists already; --force replaces it");
 }
 

@@ -102,12 +102,12 @@ fn size(sheet: &PlotSheet) -> Result<[u32; 2], String> {
     }
 }
 
-/// Returns the drawing as SVG.
+/// Returns the drawing as SVG, with dark colours for a system that is dark.
 fn svg(sheet: &PlotSheet) -> Result<String, String> {
     let [w, h] = size(sheet)?;
     let mut out = String::new();
     draw(sheet, &SVGBackend::with_string(&mut out, (w, h)).into_drawing_area(), 1)?;
-    Ok(out)
+    Ok(hzn_plot::with_dark(&out))
 }
 
 /// Returns the drawing as a picture.
@@ -257,6 +257,7 @@ mod tests {
         let drawn = |colour: &str| text.matches(&format!("stroke=\"{colour}\"")).count();
         // Two parts in each of two plots and an entry in one legend; then two parts in one plot and an entry.
         assert_eq!((drawn("#0072B2"), drawn("#D55E00")), (5, 3), "{text}");
+        assert!(text.contains(hzn_plot::DARK) && drawn("#FFFFFF") == 0, "{text}");
         let circles = text.matches("<circle").count();
         assert_eq!(circles, 3, "a part of one point is a dot");
         let banded = PlotRow { band: Some([-3.0, 3.0]), ..row("Error over σ", &["error/σ"]) };

@@ -23,6 +23,10 @@ const MORE_STYLE: &str = ".warning{background:#fff3d6;padding:.5rem 1rem}figure{
 .plots{grid-template-columns:repeat(auto-fit,minmax(520px,1fr));margin:1.5rem 0}\
 th{text-align:left;padding:.2rem .8rem;border-bottom:2px solid #ccc}.number{text-align:right}.left-out{color:#888}";
 
+/// Rules of style for the drawings of the frame on a dark system, in addition to those of charts.
+const DARK_FRAME: &str = "@media(prefers-color-scheme:dark){svg rect[fill='#fafafa']{fill:#1c1f24}\
+svg rect[fill='#f3c1b0']{fill:#7a3b2a}svg [stroke='#444']{stroke:#9aa3ad}svg [stroke='#fff']{stroke:#15171b}}";
+
 /// Returns the page. `reasons` says why pictures were left out before the fit.
 pub(super) fn html(calibrated: &Calibrated, reasons: &Reasons, pictures: &str) -> anyhow::Result<String> {
     let row = |(name, value): &(String, String)| format!("<tr><td>{name}</td><td>{}</td></tr>", escape(value));
@@ -78,10 +82,12 @@ fn frame(camera: &Config) -> (String, f64) {
     let scale = w / WIDTH;
     let begin = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"{0} {0} {w} {h}\" width=\"{WIDTH}\">\
+         <style>{2}{DARK_FRAME}</style>\
          <rect x=\"{0}\" y=\"{0}\" width=\"{w}\" height=\"{h}\" fill=\"#fafafa\" stroke=\"#444\" \
          stroke-width=\"{1}\"/>",
         -0.5,
-        2.0 * scale
+        2.0 * scale,
+        hzn_plot::DARK
     );
     (begin, scale)
 }
@@ -99,8 +105,8 @@ fn quiver(calibrated: &Calibrated) -> String {
         let [x, y] = [u + factor * r.error_px[0], v + factor * r.error_px[1]];
         let _ = write!(
             svg,
-            "<line x1=\"{u:.1}\" y1=\"{v:.1}\" x2=\"{x:.1}\" y2=\"{y:.1}\" stroke=\"#0072b2\" stroke-width=\"{:.2}\"/>\
-             <circle cx=\"{u:.1}\" cy=\"{v:.1}\" r=\"{:.1}\" fill=\"#0072b2\"/>",
+            "<line x1=\"{u:.1}\" y1=\"{v:.1}\" x2=\"{x:.1}\" y2=\"{y:.1}\" stroke=\"#0072B2\" stroke-width=\"{:.2}\"/>\
+             <circle cx=\"{u:.1}\" cy=\"{v:.1}\" r=\"{:.1}\" fill=\"#0072B2\"/>",
             scale,
             1.3 * scale
         );
