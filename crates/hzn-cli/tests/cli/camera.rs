@@ -73,6 +73,10 @@ fn a_map_of_the_picture() {
     assert!(at(2.0, 2.0)[1] < 40, "{:?}", at(2.0, 2.0));
     let near = at(sensor.cx_px + 8.0, sensor.cy_px + 8.0);
     assert!(near[0] > 200 && near[2] < 60, "{near:?}");
+    // The last line says where the map comes from, in grey letters.
+    let last = map.rows().skip(map.height() as usize - 36).flatten();
+    let ink = last.filter(|p| p.0[0] > 90 && p.0[2] > p.0[0]).count();
+    assert!(ink > 200, "{ink}");
 }
 
 #[test]

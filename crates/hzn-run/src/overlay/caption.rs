@@ -16,6 +16,11 @@ const FAINT: Colour = [160, 166, 176];
 const TEXT_LINES: u32 = 2;
 /// Width of a whole legend with a scale, in heights of a line.
 const LEGEND_WIDTH: u32 = 46;
+/// Width of a usual last line, and height of one of its lines as a part of a line of text, in the same unit.
+const LAST_WIDTH: u32 = 35;
+const LAST_LINE: f32 = 0.8;
+/// Angles of the bar, degrees.
+const BAR_DEG: [f64; 11] = [5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002];
 /// Size of the letters, and of those of the last line, in heights of a line.
 const LETTER: f32 = 0.74;
 const SMALL: f32 = 0.6;
@@ -36,8 +41,8 @@ pub struct Caption {
     pub text: String,
     /// Entries of the legend.
     pub legend: Vec<Entry>,
-    /// Length of a bar in pixels, and what it stands for.
-    pub scale: Option<(f64, String)>,
+    /// Focal length in pixels, for a bar that is as long as an angle near the optical axis.
+    pub scale: Option<f64>,
     /// Version, command and sensor that made the picture.
     pub provenance: String,
 }
@@ -59,10 +64,11 @@ impl Caption {
         self
     }
 
-    /// Adds a bar that is as long as 5° near the optical axis of a camera with this focal length.
+    /// Adds a bar that is as long as 5° near the optical axis of a camera with this focal length. Where this is more
+    /// than a quarter of the picture, it is as long as a smaller angle.
     #[must_use]
     pub fn with_scale(self, fx_px: f64) -> Self {
-        Self { scale: Some((fx_px * 5f64.to_radians().tan(), "5°".to_owned())), ..self }
+        Self { scale: Some(fx_px), ..self }
     }
 
     /// Adds the line about version, command and sensor.
@@ -78,10 +84,25 @@ pub fn answer(row: &Row, reason: Option<&str>) -> String {
     let mut text = format!("{}: {}", row.body, row.status);
     text.extend(row.sigma_max_deg.map(|s| format!(", 3σ {:.4}°", 3.0 * s)));
     text.extend(row.rms_px.map(|rms| format!(", RMS {rms:.2} px")));
-    let detail = Some(row.detail.as_str()).filter(|detail| !detail.is_empty());
-    let why = reason.or(detail).filter(|_| row.status != Status::Ok);
+    let detail = Some(shorten_detail(&row.detail)).filter(|detail| !detail.is_empty());
+    let why = reason.or(detail.as_deref()).filter(|_| row.status != Status::Ok);
     text.extend(why.map(|why| format!(" ({why})")));
     text
+}
+
+/// Shortens the detail of a row without an answer, for example `ended at gates: short-arc, short-arc`: a verdict of
+/// several edges appears once, with its count.
+pub fn shorten_detail(detail: &str) -> String {
+    let Some((stage, verdicts)) = detail.split_once(": ") else { return detail.to_owned() };
+    let mut counted: Vec<(&str, usize)> = Vec::new();
+    for verdict in verdicts.split(", ") {
+        match counted.iter_mut().find(|(v, _)| *v == verdict) {
+            Some((_, n)) => *n += 1,
+            None => counted.push((verdict, 1)),
+        }
+    }
+    let each = counted.iter().map(|(v, n)| if *n > 1 { format!("{v} ×{n}") } else { (*v).to_owned() });
+    format!("{stage}: {}", each.collect::<Vec<_>>().join(", "))
 }
 
 /// Returns the legend of what is drawn.
@@ -112,11 +133,16 @@ fn legend_lines(width: u32, line: u32) -> u32 {
     (LEGEND_WIDTH * line).div_ceil(width.max(1)).clamp(1, 4)
 }
 
+/// Returns the number of lines of the text about version, command and sensor: a narrow picture needs two.
+fn last_lines(width: u32, line: u32) -> u32 {
+    (LAST_WIDTH * line).div_ceil(width.max(1)).clamp(1, 2)
+}
+
 /// Returns the height that a caption adds to a picture, in pixels. It does not depend on the text, so that all pictures
 /// of a video have one size.
 pub fn height_px(width: u32, height: u32) -> u32 {
     let line = line_px(width, height);
-    (TEXT_LINES + legend_lines(width, line) + 1) * line + line / 4
+    (TEXT_LINES + legend_lines(width, line) + last_lines(width, line)) * line + line / 4
 }
 
 /// Returns the picture with a caption below it.
@@ -135,11 +161,19 @@ pub fn add(letters: &Letters, picture: &RgbImage, caption: &Caption) -> RgbImage
     }
     let top = h + line / 4 + TEXT_LINES * line;
     add_legend(letters, &mut out, caption, [left, top], line);
-    let last = (top + legend_lines(w, line) * line) as f32;
-    for text in letters.wrap(&caption.provenance, small, room, 1) {
+    let mut last = (top + legend_lines(w, line) * line) as f32;
+    for text in letters.wrap(&caption.provenance, small, room, last_lines(w, line) as usize) {
         letters.write(&mut out, [left as f32, last], &text, small, FAINT);
+        last += LAST_LINE * line as f32;
     }
     out
+}
+
+/// Returns the length in pixels of the longest bar that fits into a quarter of the picture, and its angle.
+fn bar(fx_px: f64, width: u32) -> Option<(u32, String)> {
+    let length = |deg: f64| (fx_px * deg.to_radians().tan()).round();
+    let deg = BAR_DEG.into_iter().find(|deg| length(*deg) <= f64::from(width) / 4.0)?;
+    Some((length(deg) as u32, format!("{deg}°")))
 }
 
 /// Writes legend and scale, in as many lines as the height of the caption has for them.
@@ -167,11 +201,10 @@ fn add_legend(letters: &Letters, out: &mut RgbImage, caption: &Caption, [left, t
         let ink = if let [one] = colours.as_slice() { *one } else { INK };
         letters.write(out, [(x + boxes + line / 5) as f32, y as f32], name, size, ink);
     }
-    if let Some((length, what)) = &caption.scale {
-        let length = (length.round() as u32).min(w / 4);
-        let Some([x, y]) = place(length + line / 4 + width_px(what)) else { return };
+    if let Some((length, what)) = caption.scale.and_then(|fx_px| bar(fx_px, w)) {
+        let Some([x, y]) = place(length + line / 4 + width_px(&what)) else { return };
         fill(out, [x, y + line / 2], [length, (line / 10).max(2)], INK);
-        letters.write(out, [(x + length + line / 4) as f32, y as f32], what, size, INK);
+        letters.write(out, [(x + length + line / 4) as f32, y as f32], &what, size, INK);
     }
 }
 
@@ -183,7 +216,7 @@ mod tests {
         Caption {
             text: "flight/0001.png, 12.500 s: rejected, half-angle".into(),
             legend: vec![Entry { name: "fitted limb".into(), colours: vec![LIMB] }],
-            scale: Some((87.0, "5°".into())),
+            scale: Some(994.0),
             provenance: "sensor 0123456789ab, hzn 0.1.0, hzn run flight".into(),
         }
     }
@@ -203,9 +236,53 @@ mod tests {
     }
 
     #[test]
+    fn a_verdict_of_many_edges_is_said_once() {
+        let long = "ended at gates: residuals, short-arc, no-fit, short-arc, short-arc";
+        assert_eq!(shorten_detail(long), "ended at gates: residuals, short-arc ×3, no-fit");
+        assert_eq!(shorten_detail("ended at contour"), "ended at contour");
+    }
+
+    #[test]
+    fn the_bar_is_as_long_as_its_angle() {
+        // Usual cameras, the Sun with a long lens, and Jupiter from Cassini, whose field of view is 0.35°.
+        for (fx_px, width, expected) in [
+            (994.0, 1280, (87, "5°")),
+            (92.0, 384, (8, "5°")),
+            (8000.0, 1280, (279, "2°")),
+            (166_892.0, 1024, (146, "0.05°")),
+        ] {
+            assert_eq!(bar(fx_px, width), Some((expected.0, expected.1.to_owned())), "{fx_px}");
+        }
+        assert_eq!(bar(1e9, 640), None);
+    }
+
+    #[test]
     fn a_caption_of_a_tiny_picture_stays_within_it() {
         let tiny = RgbImage::new(30, 20);
         assert_eq!(add(&Letters::default(), &tiny, &caption()).width(), 30);
+    }
+
+    /// The pictures are those of the gallery.
+    #[test]
+    fn a_narrow_picture_has_its_whole_command() {
+        let photograph = |file: &str, name: &str| {
+            let (picture, sensor) = (format!("tests/data/real/{file}.png"), format!("tests/data/real/{file}.toml"));
+            format!("hzn explain {picture} --sensor {sensor} --overlay {name}.png --force")
+        };
+        let commands = [
+            (384, 288, "hzn explain leo-infrared --index 1 --overlay infrared.png --force".to_owned()),
+            (512, 512, photograph("sun-hmi-continuum-2023-01-31", "sun")),
+            (513, 487, photograph("opssat-2020-08-16", "ops-sat")),
+            (1600, 1067, photograph("iss073e0293986-aurora", "aurora")),
+        ];
+        for (width, height, command) in commands {
+            let line = line_px(width, height);
+            let (size, room) = (SMALL * line as f32, (width - 2 * (line / 3)) as f32);
+            let text = format!("hzn 0.1.0, sensor 0123456789ab, {command}");
+            let lines = Letters::default().wrap(&text, size, room, last_lines(width, line) as usize);
+            assert!(!lines.concat().contains('…'), "{width}: {lines:?}");
+            assert_eq!(lines.len(), last_lines(width, line) as usize, "{width}: {lines:?}");
+        }
     }
 
     #[test]

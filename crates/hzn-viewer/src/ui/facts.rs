@@ -184,31 +184,9 @@ fn gates(report: &Report<f64>) -> Vec<String> {
     }
 }
 
-/// Shortens the detail of a row without an answer, for example `ended at gates: short-arc, short-arc`: a verdict of
-/// several edges appears once, with its count.
-pub(super) fn shorten_detail(detail: &str) -> String {
-    let Some((stage, verdicts)) = detail.split_once(": ") else { return detail.to_owned() };
-    let mut counted: Vec<(&str, usize)> = Vec::new();
-    for verdict in verdicts.split(", ") {
-        match counted.iter_mut().find(|(v, _)| *v == verdict) {
-            Some((_, n)) => *n += 1,
-            None => counted.push((verdict, 1)),
-        }
-    }
-    let each = counted.iter().map(|(v, n)| if *n > 1 { format!("{v} ×{n}") } else { (*v).to_owned() });
-    format!("{stage}: {}", each.collect::<Vec<_>>().join(", "))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_verdict_of_many_edges_is_said_once() {
-        let long = "ended at gates: residuals, short-arc, no-fit, short-arc, short-arc";
-        assert_eq!(shorten_detail(long), "ended at gates: residuals, short-arc ×3, no-fit");
-        assert_eq!(shorten_detail("ended at contour"), "ended at contour");
-    }
 
     #[test]
     fn a_lens_that_follows_the_temperature_is_told() {

@@ -2,10 +2,11 @@
 
 use egui::{Color32, Rect, RichText, Ui, vec2};
 use hzn_core::status::Status;
+use hzn_run::overlay::caption::shorten_detail;
 
 use super::panels::Panel;
 use super::viewer::Viewer;
-use super::{Command, camera_card, facts, number, theme};
+use super::{Command, camera_card, number, theme};
 use crate::model::quantity;
 use crate::model::settings::{Contrast, Layer, Look};
 use crate::work::frame_view::{BodyResult, FrameView};
@@ -172,7 +173,7 @@ fn detail(frame_view: &FrameView, answer: Option<&BodyResult>) -> Vec<String> {
                 let (fitted, expected) = (fit.fitted_deg, fit.expected_deg);
                 format!("half-angle {fitted:.2}° fitted, {expected:.2}° expected: {:+.1} σ", fit.sigmas)
             });
-            [facts::shorten_detail(&answer.row.detail)].into_iter().chain(fit).collect()
+            [shorten_detail(&answer.row.detail)].into_iter().chain(fit).collect()
         }
         _ => Vec::new(),
     }

@@ -21,9 +21,12 @@ const LINE_PX: u32 = 24;
 const LEGEND: u32 = 5;
 /// Size of the letters in pixels.
 const LETTER_PX: f32 = 17.0;
+/// Size of the letters of the last line in pixels.
+const SMALL_PX: f32 = 14.0;
 
 const WHITE: Colour = [255, 255, 255];
 const BLACK: Colour = [0, 0, 0];
+const FAINT: Colour = [160, 166, 176];
 const CIRCLE: Colour = [213, 94, 0];
 const LIMIT: Colour = [255, 0, 200];
 const OUTSIDE: Colour = [70, 70, 70];
@@ -40,13 +43,14 @@ struct Map<'a> {
     height: u32,
 }
 
-/// Draws the map of a calibration.
-pub(super) fn draw(config: &Config, title: &str) -> Result<RgbImage, Stop> {
+/// Draws the map of a calibration. `provenance` is the last line.
+pub(super) fn draw(config: &Config, title: &str, provenance: &str) -> Result<RgbImage, Stop> {
     let camera = Camera::<f64>::try_new(config).map_err(usage)?;
     let scale = SIDE_PX / f64::from(config.width.max(config.height));
     let side = |pixels: u16| ((f64::from(pixels) * scale).round() as u32).max(1);
     let (width, height) = (side(config.width), side(config.height));
-    let image = RgbImage::from_pixel(width + RIGHT_PX, height + TOP_PX + LEGEND * LINE_PX + 12, Rgb([20, 20, 20]));
+    let below = (LEGEND + 1) * LINE_PX + 12;
+    let image = RgbImage::from_pixel(width + RIGHT_PX, height + TOP_PX + below, Rgb([20, 20, 20]));
     let mut map = Map { config, canvas: Canvas { image }, letters: Letters::default(), scale, width, height };
     map.fill(&camera);
     map.contours(&camera);
@@ -74,6 +78,10 @@ pub(super) fn draw(config: &Config, title: &str) -> Result<RgbImage, Stop> {
         let y = TOP_PX + height + 12 + LINE_PX * i as u32;
         map.text(8, y, &map.shorten(line, width + RIGHT_PX));
     }
+    let room = (width + RIGHT_PX).saturating_sub(16) as f32;
+    let last = map.letters.wrap(provenance, SMALL_PX, room, 1).concat();
+    let y = (TOP_PX + height + 12 + LINE_PX * LEGEND) as f32;
+    map.letters.write(&mut map.canvas.image, [8.0, y], &last, SMALL_PX, FAINT);
     Ok(map.canvas.image)
 }
 

@@ -12,8 +12,8 @@ use hzn_core::camera::{self, Camera};
 use hzn_core::frames::UnitVec3;
 use hzn_files::camera_file::{self, Choice};
 use hzn_run::engine::AnySensor;
-use hzn_run::overlay;
 use hzn_run::source::ending;
+use hzn_run::{overlay, provenance};
 
 use self::field::{end_rad, field_of_view};
 use crate::exit::{Exit, Outcome, Stop, usage};
@@ -59,7 +59,10 @@ pub(super) fn run(args: &Args) -> Outcome {
             }
             tell::result(describe(&config)?)?;
             if let Some(path) = picture {
-                overlay::save(&map::draw(&config.camera, &file.display().to_string())?, path)?;
+                // A camera file of another tool is no sensor.
+                let sensor = if ending(file) == "toml" { provenance::hash(&config) } else { None };
+                let last = provenance::line(sensor.as_deref(), &provenance::command("hzn"));
+                overlay::save(&map::draw(&config.camera, &file.display().to_string(), &last)?, path)?;
             }
         }
         Command::Convert(args) => convert::run(args)?,
