@@ -1,8 +1,7 @@
 //! The residuals of a lens calibration: an arrow from each measured point, all enlarged by the same factor.
 
-use egui::{Align2, Painter, Pos2, Rect, Stroke};
+use egui::{Painter, Pos2, Stroke};
 
-use super::read_out::corner_label;
 use crate::model::settings::Layer;
 use crate::model::view::Point;
 use crate::ui::placement::Placement;
@@ -13,22 +12,21 @@ use crate::work::FrameView;
 /// Length of an arrow of the RMS, as a part of the width of the picture.
 const LENGTH: f64 = 0.02;
 
-/// Draws the arrows, if there are residuals and their overlay is switched on. Their label avoids what is taken.
+/// Draws the arrows, if there are residuals and their overlay is switched on. Returns what is to be said about them.
 pub(super) fn draw(
     viewer: &Viewer,
     painter: &Painter,
     frame_view: &FrameView,
     placement: &Placement<'_>,
-    taken: &mut Vec<Rect>,
-) {
-    let Some(residuals) = &viewer.companions.residuals else { return };
+) -> Option<String> {
+    let residuals = viewer.companions.residuals.as_ref()?;
     if !viewer.settings.shows(Layer::Lens) || viewer.layers_hidden {
-        return;
+        return None;
     }
     let names = viewer.sequence.entries.iter().map(|e| e.name.as_str());
     let arrows = residuals.of_picture(&frame_view.name, names);
     if arrows.is_empty() {
-        return;
+        return None;
     }
     let factor = residuals.enlargement(LENGTH * placement.size[0]);
     let clip = painter.clip_rect().expand(20.0);
@@ -50,11 +48,10 @@ pub(super) fn draw(
             }
         }
     }
-    let text = format!(
+    Some(format!(
         "{}: {} residuals, enlarged {factor:.0} times; RMS {:.3} px; circles: outliers",
         residuals.file,
         arrows.len(),
         residuals.rms_px
-    );
-    corner_label(painter, Align2::RIGHT_TOP, &text, taken);
+    ))
 }

@@ -108,16 +108,22 @@ fn draw_layers(
     // Texts that are placed later avoid these places.
     let mut taken = Vec::new();
     let mut vertical = None;
-    if let Some(outcome) = frame_view.answers.get(pane).filter(|_| !viewer.layers_hidden) {
+    let outcome = frame_view.answers.get(pane).filter(|_| !viewer.layers_hidden);
+    if let Some(outcome) = outcome {
         vertical = overlays::draw(viewer, painter, frame_view, outcome, placement, &mut taken);
+    }
+    let residuals = if pane == 0 { lens::draw(viewer, painter, frame_view, placement) } else { None };
+    if let Some(outcome) = outcome {
         inset::draw(viewer, painter, frame_view, outcome, &mut taken);
     }
     let compared = viewer.other.as_ref().map(|(name, _)| if pane == 0 { compare::OURS } else { name.as_str() });
     for text in compared.into_iter().chain(vertical.as_deref()) {
         corner_label(painter, Align2::LEFT_TOP, text, &mut taken);
     }
+    if let Some(text) = residuals {
+        corner_label(painter, Align2::RIGHT_TOP, &text, &mut taken);
+    }
     if pane == 0 {
-        lens::draw(viewer, painter, frame_view, placement, &mut taken);
         mask::draw(viewer, painter, placement, ui);
         circle::draw(viewer, painter, placement);
     }
