@@ -30,6 +30,8 @@ use crate::model::{Sequence, atomic_file};
 /// Colours of masked parts, and of Sun and Moon.
 const MASK: [u8; 3] = [120, 120, 132];
 const SKY: [u8; 3] = [255, 236, 170];
+/// Colour of Sun and Moon behind a body.
+const HIDDEN: [u8; 3] = [128, 118, 85];
 
 /// Returns the annotations of the layers that are switched on.
 pub fn annotations(outcome: &Outcome, layers: &[Layer]) -> Annotations {
@@ -123,24 +125,32 @@ impl Drawn<'_> {
         let camera = Camera::try_new(&outcome.config.camera).ok().filter(|_| layers.contains(&Layer::Sky));
         let Some(camera) = camera else { return };
         for place in sky::places(self.data, self.truth, &outcome.bodies, &camera) {
-            self.draw_place(canvas, letters, place.at, 9.0, &place.name);
+            let colour = if place.is_hidden { HIDDEN } else { SKY };
+            self.draw_place(canvas, letters, (place.at, 9.0), &place.name, colour);
         }
         for star in stars::places(self.data, &outcome.bodies, &camera) {
-            self.draw_place(canvas, letters, star.at, 5.0, star.name);
+            self.draw_place(canvas, letters, (star.at, 5.0), star.name, SKY);
         }
     }
 
-    /// Draws a circle with a name next to it.
-    fn draw_place(&self, canvas: &mut Canvas, letters: &Letters, at: [f64; 2], radius: f64, name: &str) {
+    /// Draws a circle, given by its centre and its radius, with a name next to it.
+    fn draw_place(
+        &self,
+        canvas: &mut Canvas,
+        letters: &Letters,
+        (at, radius): ([f64; 2], f64),
+        name: &str,
+        colour: [u8; 3],
+    ) {
         let radius = radius * self.pen();
         let around = |i: u32| {
             let (s, c) = (f64::from(i) / 48.0 * std::f64::consts::TAU).sin_cos();
             [at[0] + radius * c, at[1] + radius * s]
         };
-        canvas.polyline(&(0..=48).map(around).collect::<Vec<_>>(), self.pen(), SKY);
+        canvas.polyline(&(0..=48).map(around).collect::<Vec<_>>(), self.pen(), colour);
         let corner = [at[0] + 1.4 * radius, at[1] - 7.0 * self.pen()].map(|x| x as f32);
         let size = 14.0 * self.pen() as f32;
-        letters.write(&mut canvas.image, corner, name, size, SKY);
+        letters.write(&mut canvas.image, corner, name, size, colour);
     }
 }
 

@@ -103,6 +103,34 @@ fn the_saved_picture_has_axis_sun_and_mask() {
     }
 }
 
+/// The export draws what is hidden in a darker colour, as the window does, and says what hides it.
+#[test]
+fn a_moon_behind_the_earth_is_fainter_in_the_saved_picture() {
+    // The first one is 7° from the centre of a disc of 15°.
+    for (moon, at, is_hidden) in [("0.0998,0.12,0.9877", [186, 151], true), ("-0.447,0.179,0.876", [27, 173], false)] {
+        let (dir, pictures) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        disc(pictures.path());
+        let header = "file,time_s,body,limb,axis_x,axis_y,axis_z,half_angle_deg,altitude_km,moon_x,moon_y,moon_z,qw,qx,\
+                      qy,qz";
+        let row = format!("disc.png,0,earth-sphere,1,0.0998,0,0.995,15,18283,{moon},1,0,0,0");
+        std::fs::write(pictures.path().join("truth.csv"), format!("{header}\n{row}\n")).unwrap();
+        let mut window = window_on(pictures.path());
+        window.run_steps(3);
+        let name = if is_hidden { "Moon, behind the Earth" } else { "Moon" };
+        place_of(&window, |text| text == name);
+        let png = dir.path().join("moon.png");
+        window.key_press_modifiers(Modifiers::COMMAND, Key::E);
+        path(&mut window, &png, "Write");
+        said(&mut window, "moon.png");
+        let saved = image::open(&png).unwrap().to_rgb8();
+        let near = image::imageops::crop_imm(&saved, at[0] - 14, at[1] - 14, 28, 28).to_image();
+        let yellow = near.pixels().map(|p| i32::from(p[0]) - i32::from(p[2])).max().unwrap();
+        // The colour of Sun, Moon and stars has 85 counts more in red than in blue.
+        let expected = if is_hidden { 25..55 } else { 60..90 };
+        assert!(expected.contains(&yellow), "{name}: {yellow}");
+    }
+}
+
 #[test]
 fn the_table_holds_what_is_shown() {
     let (dir, pictures) = folder();

@@ -3,24 +3,13 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use egui::{Key, Modifiers, Role};
+use egui::Role;
 use egui_kittest::kittest::Queryable;
+use hzn_core::camera::Intrinsic;
 use hzn_core::status::Status;
 use hzn_sim::flight::rocket;
 
 use crate::window::*;
-
-/// Types a number into a field of the form.
-fn type_number(window: &mut Window, field: &str, text: &str) {
-    window.get_by_role_and_label(Role::SpinButton, field).focus();
-    window.run_steps(3);
-    window.key_press_modifiers(Modifiers::COMMAND, Key::A);
-    window.run_steps(2);
-    window.event(egui::Event::Text(text.to_owned()));
-    window.run_steps(2);
-    window.key_press(Key::Enter);
-    window.run_steps(3);
-}
 
 fn click(window: &mut Window, label: &str) {
     window.get_by_label(label).click();
@@ -63,6 +52,39 @@ fn the_limb_says_a_lens_that_nobody_knows() {
     until(&mut window, "not processed", |v| v.processed() == 8 && !v.is_working());
     let answers = (0..8).filter(|i| window.state().results().cause(*i, 0).is_some_and(|c| c.status == Status::Ok));
     assert!(answers.count() >= 4, "the sensor.toml is good enough to begin with");
+}
+
+#[test]
+fn the_form_says_the_sigmas_that_the_sensor_gets() {
+    let (_dir, pictures) = folder();
+    std::fs::remove_file(pictures.join("sensor.toml")).unwrap();
+    let mut window = window_with_form(&pictures);
+    click(&mut window, "from the field of view");
+    let words = |window: &Window| {
+        let texts = painted(window);
+        texts.into_iter().map(|(text, _)| text).find(|text| text.starts_with("Focal length ")).unwrap()
+    };
+    let first = words(&window);
+    assert!(first.starts_with("Focal length 277 px ± ") && first.ends_with("(1 sigma)."), "{first}");
+    type_number(&mut window, "field of view over the width", "63,2");
+    type_number(&mut window, "altitude above the ground", "240");
+    let said = words(&window);
+    click(&mut window, "Make sensor.toml");
+    settled(&mut window);
+    let config = window.state().session().unwrap().config().unwrap().clone();
+    let (camera, body) = (&config.camera, &config.body);
+    assert!((camera.fx_px - 260.0).abs() < 0.5 && body.altitude_km == Some(240.0), "{camera:?}");
+    let sigma = |which: Intrinsic| {
+        let at = camera.model.intrinsics().iter().position(|i| *i == which).unwrap();
+        camera.covariance.as_ref().unwrap().rows[at][at].sqrt()
+    };
+    for part in [
+        format!("Focal length {:.0} px ± {:.1} %, ", camera.fx_px, 100.0 * sigma(Intrinsic::FxPx) / camera.fx_px),
+        format!("principal point ± {:.0} px, ", sigma(Intrinsic::CxPx)),
+        format!("the altitude ± {:.1} km (1 sigma).", body.altitude_sigma_km),
+    ] {
+        assert!(said.contains(&part), "{part} in {said}");
+    }
 }
 
 #[test]

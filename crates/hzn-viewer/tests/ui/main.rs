@@ -18,6 +18,7 @@ mod rig;
 mod small;
 mod steady;
 mod tune;
+mod typed;
 mod welcome;
 mod window;
 mod wrong;

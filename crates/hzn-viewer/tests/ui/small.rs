@@ -15,19 +15,6 @@ fn shows(window: &Window, words: &str) -> bool {
     window.query_all_by_label_contains(words).next().is_some()
 }
 
-/// Types a number into a field, and leaves the field.
-fn type_number(window: &mut Window, field: &str, text: &str) {
-    let find = |window: &Window| window.get_by_role_and_label(Role::SpinButton, field).focus();
-    find(window);
-    window.run_steps(3);
-    window.key_press_modifiers(Modifiers::COMMAND, Key::A);
-    window.run_steps(2);
-    window.event(egui::Event::Text(text.to_owned()));
-    window.run_steps(2);
-    window.key_press(Key::Enter);
-    window.run_steps(3);
-}
-
 #[test]
 fn a_decimal_comma_is_read_and_other_texts_are_named() {
     let (_dir, mut window) = window_on_flight();
