@@ -25,7 +25,7 @@ const PHOTOGRAPHS: [(&str, &str); 7] = [
 /// Scenes of `hzn simulate` with further options, the index of the picture that is shown, and the picture in
 /// book/images.
 const SCENES: [(&str, &[&str], &str, &str); 5] = [
-    ("rocket", &["--frames", "6"], "1", "gallery/rocket"),
+    ("rocket", &["--frames", "6"], "5", "gallery/rocket"),
     ("full-disc", &["--frames", "4"], "1", "gallery/full-disc"),
     ("leo-infrared", &["--frames", "4"], "1", "gallery/infrared"),
     ("sun-moon", &["--frames", "4"], "1", "gallery/sun-moon"),
