@@ -437,7 +437,7 @@ fn the_heads_of_an_epoch_are_explained_with_their_joint_answer() {
     assert!(out.contains(&format!("the limit is {:.4} deg", number("separation_limit_deg"))), "{out}");
     // Two pictures of 320 x 240 lie side by side, and two below them; each has its caption below it.
     let drawn = image::open(place.path("o.png")).unwrap();
-    assert_eq!((drawn.width(), drawn.height()), (648, 674));
+    assert_eq!((drawn.width(), drawn.height()), (648, 704));
     place.run(&["explain", "ring/rig.toml", "--index", "4"]).expect(2).says("the rig has 4 epochs, numbered from 0");
     place.run(&["explain", "ring/rig.toml", "--overlay", "o.png"]).expect(2).says("--force replaces it");
     let input = ["explain", "ring/rig.toml", "--overlay", "ring/left/left-00000.png", "--force"];
