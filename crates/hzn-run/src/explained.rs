@@ -235,8 +235,16 @@ impl Explained<'_> {
 
     fn expected(&self) -> String {
         let cone = format!("{}, cone of {:.4} deg half-angle", self.body.kind.name(), self.half_angle.to_degrees());
+        let limits_km = self.config.gates.altitude_limits_km.filter(|_| !self.body.half_angle_is_free());
         let Some(km) = altitude_km(self.data, self.body) else {
-            return format!("{cone}, as seen from near the Earth");
+            return match limits_km {
+                Some([low, high]) => {
+                    format!(
+                        "{cone} (no altitude is known: searched from {low} to {high} km, [gates] altitude_limits_km)"
+                    )
+                }
+                None => format!("{cone}, as seen from near the Earth"),
+            };
         };
         let from = match self.data {
             Some(d) if d.position_km.is_some() => format!("position at {km:.2} km given with the picture"),

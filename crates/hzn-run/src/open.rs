@@ -377,10 +377,11 @@ pub fn check_altitude(source: &dyn Source, config: &Config, frames: Option<&Fram
     if frames.map_or(source.sensor_toml().is_some(), Frames::has_distances) {
         return Ok(());
     }
-    if config.each_body().iter().any(known) {
+    if config.each_body().iter().any(known) || config.gates.altitude_limits_km.is_some() {
         return check_above_limb(config);
     }
-    let what = "no altitude: set altitude_km in [body] of sensor.toml, or write altitudes into a frames.csv";
+    let what = "no altitude: set altitude_km in [body] of sensor.toml, or write altitudes into a frames.csv; if it is \
+                not known, set altitude_limits_km = [LOWEST, HIGHEST] in [gates], and the limb is searched between them";
     Err(unusable(what).with_remedy(Remedy::Altitude))
 }
 
@@ -391,7 +392,12 @@ fn check_above_limb(config: &Config) -> Result<(), Error> {
     let below = |e: &Result<f64, PriorError>| e.err().filter(|e| matches!(e, PriorError::BelowLimb { .. }));
     match half_angles.iter().map(below).collect::<Option<Vec<_>>>().and_then(|each| each.first().copied()) {
         Some(why) => {
-            Err(unusable(format!("body.altitude_km: {why}, so no limb can be seen; give the altitude of the camera")))
+            let key = if config.each_body().iter().any(|body| body.altitude_km.is_some()) {
+                "body.altitude_km"
+            } else {
+                "gates.altitude_limits_km"
+            };
+            Err(unusable(format!("{key}: {why}, so no limb can be seen; give the altitude of the camera")))
         }
         None => Ok(()),
     }

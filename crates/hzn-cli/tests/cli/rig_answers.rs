@@ -1,9 +1,9 @@
-//! What the joint answers of a rig say: the covariance.
+//! What the joint answers of a rig say: the covariance, and the altitude.
 
 use hzn_core::frames::Cov3;
 use nalgebra::Matrix3;
 
-use crate::common::cell;
+use crate::common::{Place, cell};
 use crate::rig::{ring, run};
 
 fn number(row: &[(String, String)], name: &str) -> f64 {
@@ -31,4 +31,104 @@ fn joint_answers_tell_a_filter_what_the_next_epoch_shares() {
     for row in &heads {
         assert!(covariance(row, "cov_common").trace() > covariance(&joint[0], "cov_common").trace());
     }
+}
+
+/// Takes columns from the table of the vehicle.
+fn forget(place: &Place, columns: &[&str]) {
+    let table = place.read("ring/frames.csv");
+    let mut lines = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let names = lines.next().unwrap();
+    let keep: Vec<bool> = names.iter().map(|name| !columns.contains(name)).collect();
+    let kept = |line: Vec<&str>| {
+        let cells: Vec<&str> = line.iter().zip(&keep).filter_map(|(cell, keep)| keep.then_some(*cell)).collect();
+        cells.join(",") + "\n"
+    };
+    let forgotten: String = std::iter::once(names.clone()).chain(lines).map(kept).collect();
+    place.write("ring/frames.csv", forgotten.as_bytes());
+}
+
+/// Takes the altitude from the vehicle, and tells its heads limits instead, if there are any.
+fn forget_altitude(place: &Place, limits_km: Option<[f64; 2]>) {
+    forget(place, &["altitude_km", "x_km", "y_km", "z_km"]);
+    for head in ["front", "right", "back", "left"] {
+        let file = format!("ring/{head}/sensor.toml");
+        let mut sensor = place.read(&file);
+        assert!(!sensor.contains("altitude_km ="), "{sensor}");
+        if let Some(km) = limits_km {
+            assert!(!sensor.contains("[gates]"), "{sensor}");
+            sensor += &format!("[gates]\naltitude_limits_km = {km:?}\n");
+        }
+        place.write(&file, sensor.as_bytes());
+    }
+}
+
+/// Returns the RMS error of the joint answers, degrees.
+fn rms_deg(place: &Place) -> f64 {
+    place.run(&["run", "ring/rig.toml", "-o", "out.csv", "-q", "--force"]).expect(0);
+    place.run(&["evaluate", "out.csv", "--truth", "ring", "-o", "r.json", "--force"]).expect(0);
+    let json: serde_json::Value = serde_json::from_str(&place.read("r.json")).unwrap();
+    assert_eq!(json["evaluations"][0]["answered"], 4);
+    json["evaluations"][0]["errors"]["rms_deg"].as_f64().unwrap()
+}
+
+#[test]
+fn a_rig_finds_limb_and_altitude_between_two_altitudes() {
+    let place = ring();
+    // Without a position, the change of the limb height with the latitude is not known, which is a tilt.
+    forget(&place, &["x_km", "y_km", "z_km"]);
+    let told_deg = rms_deg(&place);
+    // The scene flies at 490 to 510 km.
+    forget_altitude(&place, Some([400.0, 700.0]));
+    let deg = rms_deg(&place);
+    assert!(deg < 1.01 * told_deg && told_deg < 0.03, "{deg} {told_deg}");
+    let (joint, heads) = run(&place, &[], 0);
+    for row in joint.iter().chain(&heads) {
+        assert_eq!((cell(row, "status"), cell(row, "altitude_km")), ("ok", ""), "{row:?}");
+    }
+    for row in &joint {
+        let (km, sigma_km) = (number(row, "altitude_est_km"), number(row, "altitude_est_sigma_km"));
+        assert!((km - 500.0).abs() < 10.0 + 3.0 * sigma_km && sigma_km < 10.0, "{km} {sigma_km}");
+        // Without an altitude, the half-angle says nothing of the limb height.
+        assert_eq!((cell(row, "limb_height_est_km"), cell(row, "heads_used")), ("", "front right back left"));
+    }
+    let explained = place.run(&["explain", "ring/rig.toml", "--index", "2"]).expect(0).out;
+    assert!(explained.contains("(no altitude is known: searched from 400 to 700 km, [gates]"), "{explained}");
+    // Limits without the true altitude have no limb.
+    forget_altitude(&place, None);
+    for head in ["front", "right", "back", "left"] {
+        let file = format!("ring/{head}/sensor.toml");
+        place.write(&file, place.read(&file).replace("[400.0, 700.0]", "[3000.0, 4000.0]").as_bytes());
+    }
+    let (joint, heads) = run(&place, &[], 0);
+    assert!(joint.iter().chain(&heads).all(|row| cell(row, "status") != "ok"));
+    assert!(joint.iter().all(|row| cell(row, "status") != "no-altitude"));
+}
+
+#[test]
+fn without_altitude_and_limits_the_keys_are_named() {
+    let place = ring();
+    forget_altitude(&place, None);
+    place
+        .run(&["run", "ring/rig.toml", "-o", "r.csv"])
+        .expect(2)
+        .says("head front: no altitude: set altitude_km in [body] of sensor.toml")
+        .says("set altitude_limits_km = [LOWEST, HIGHEST] in [gates], and the limb is searched between them");
+    // Below all limbs there is none.
+    forget_altitude(&place, Some([5.0, 9.0]));
+    place.run(&["run", "ring/rig.toml", "-o", "r.csv"]).expect(2).says("gates.altitude_limits_km: altitude");
+    // If a part of the rows has an altitude, the others are not refused, and the rig has no such status.
+    forget_altitude(&place, None);
+    for head in ["front", "right", "back", "left"] {
+        let file = format!("ring/{head}/sensor.toml");
+        let sensor = place.read(&file);
+        place.write(&file, sensor[..sensor.find("[gates]").unwrap()].as_bytes());
+    }
+    let table = place.read("ring/frames.csv");
+    let with = |(i, line): (usize, &str)| format!("{line},{}\n", ["altitude_km", "500", "", "", ""][i]);
+    place.write("ring/frames.csv", table.lines().enumerate().map(with).collect::<String>().as_bytes());
+    let (joint, heads) = run(&place, &[], 3);
+    let statuses: Vec<&str> = joint.iter().map(|row| cell(row, "status")).collect();
+    assert_eq!(statuses, ["ok", "no-limb", "no-limb", "no-limb"]);
+    assert!(cell(&joint[1], "detail").contains("set gates.altitude_limits_km in their sensor.toml"), "{joint:?}");
+    assert_eq!(heads.iter().filter(|row| cell(row, "status") == "no-altitude").count(), 12);
 }

@@ -8,7 +8,7 @@ use crate::geometry::camera::Camera;
 use crate::geometry::frames::{Cam, Rotation, Vehicle};
 use crate::geometry::pixel::ImagePoint;
 use crate::image::region::Region;
-use crate::model::body::{Expected, Prior, PriorError};
+use crate::model::body::{self, Expected, Prior, PriorError};
 
 /// Diameter of the smallest disc whose position is fitted, pixels.
 const SMALLEST_DISC_PX: f64 = 8.0;
@@ -107,6 +107,9 @@ impl<T: Real> Sensor<T> {
 
     /// Checks the prior of a picture and computes the expected cone of the body, or of the first of several bodies.
     ///
+    /// Without any altitude, `gates.altitude_limits_km` gives a wide expected half-angle: the middle of these limits,
+    /// with half of their distance as 1-sigma.
+    ///
     /// # Errors
     /// The altitude or the position is impossible.
     pub fn expect(&self, frame: &Prior<T>) -> Result<Expected<T>, PriorError> {
@@ -123,12 +126,36 @@ impl<T: Real> Sensor<T> {
             return Err(PriorError::Temperature);
         }
         let smallest = self.config.fits_position(body).then(|| self.smallest_half_angle_rad());
-        let expected = Expected { which: which as u8, ..Expected::try_new(body, frame, smallest)? };
+        let expected = match Expected::try_new(body, frame, smallest) {
+            Err(PriorError::NoAltitude) => self.expect_between(body, frame, smallest)?,
+            expected => expected?,
+        };
+        let expected = Expected { which: which as u8, ..expected };
         if cfg!(feature = "position") {
             self.check_disc(&expected)?;
             self.check_limb_in_view(&expected)?;
         }
         Ok(expected)
+    }
+
+    /// Computes the expected cone for an altitude that is only known to lie within `gates.altitude_limits_km`: the
+    /// middle of the limits, with half of their distance as 1-sigma. A gate holds the limits themselves.
+    // Not inlined: the copy of the body must not lie on the caller's stack.
+    #[inline(never)]
+    fn expect_between(
+        &self,
+        body: &body::Config,
+        frame: &Prior<T>,
+        smallest_rad: Option<T>,
+    ) -> Result<Expected<T>, PriorError> {
+        let limits = self.config.gates.altitude_limits_km.filter(|_| cfg!(feature = "horace"));
+        let [low, high] = limits.ok_or(PriorError::NoAltitude)?;
+        // Nothing below the limb height has a limb.
+        let low = low.max(body.limb_height_km).min(high);
+        let mut between = body.clone();
+        between.altitude_km = Some(0.5 * (low + high));
+        between.altitude_sigma_km = body.altitude_sigma_km.max(0.5 * (high - low));
+        Expected::try_new(&between, frame, smallest_rad)
     }
 
     /// Returns the half-angle of the smallest disc that the search finds without a known distance, radians.

@@ -212,8 +212,9 @@ class Camera:
 class Rig:
     """Several cameras (heads) on one vehicle that are one sensor.
 
-    The joint answer needs no altitude and no limb height, because heads that look at different parts of the limb see a
-    wrong height with different signs. Each head is checked by the others.
+    The joint direction depends neither on the altitude nor on the limb height, because heads that look at different
+    parts of the limb see a wrong height with different signs. Each head is checked by the others. A head searches for
+    a limb of the size that the altitude says, or between the altitudes ``gates.altitude_limits_km`` of its sensor.
 
     Parameters
     ----------

@@ -1,13 +1,16 @@
 //! The coarse direction of an epoch without an answer, for its row.
 
+use std::f64::consts::FRAC_PI_2;
+
 use hzn_core::frames::{Cam, UnitVec3};
 use hzn_core::rig::{GlimpsedHead, Light, Mount, coarse};
 use hzn_core::status::Status;
-use hzn_core::{Expected, Sensor, threshold};
+use hzn_core::{Expected, Prior, Sensor, threshold};
 use hzn_mcap::Row;
 
 use super::seen::Seen;
 use crate::engine;
+use crate::record::altitude_km;
 
 /// The part of full scale from which on a place is lit, if no picture of the head had a limb yet. The sky with the
 /// camera's own level is usually below a tenth, and an exposure for the body gives it a third or more.
@@ -37,7 +40,7 @@ pub(super) fn set(row: &mut Row, sensors: &[Sensor<f64>], mounts: &[Mount<f64>],
         let level = level_of(sensor.config().threshold_of(0), head.level, glimpse.full_scale());
         Some(GlimpsedHead { glimpse, level, camera: sensor.camera(), mount })
     });
-    let half_angle = all().find_map(|((sensor, _), head)| expected(sensor, head)).map(|e| [e.half_angle_rad(); 2]);
+    let half_angle = all().find_map(|((sensor, _), head)| half_angles(sensor, head));
     let sun = || {
         all().find_map(|((_, mount), head)| {
             let sun: UnitVec3<Cam, f64> = engine::prior(head.frame?.data.as_ref(), 0, body).ok()?.sun?;
@@ -49,6 +52,20 @@ pub(super) fn set(row: &mut Row, sensors: &[Sensor<f64>], mounts: &[Mount<f64>],
         [row.coarse_x, row.coarse_y, row.coarse_z] = coarse.axis.xyz().map(Some);
         row.coarse_sigma_deg = Some(coarse.sigma_rad.to_degrees());
     }
+}
+
+/// Returns the limits of the half-angle of the first body in the picture of a head, radians; `None` if nothing is known
+/// of the altitude.
+fn half_angles(sensor: &Sensor<f64>, head: &Seen<'_>) -> Option<[f64; 2]> {
+    let (own, body) = (expected(sensor, head)?, sensor.config().each_body().first()?);
+    let data = head.frame?.data.as_ref();
+    let limits_km = sensor.config().gates.altitude_limits_km.filter(|_| altitude_km(data, body).is_none());
+    let Some([low, high]) = limits_km else { return Some([own.half_angle_rad(); 2]) };
+    let prior = engine::prior(data, 0, body).ok()?;
+    let seen_from =
+        |km: f64| Some(sensor.expect(&Prior { altitude_m: Some(km * 1e3), ..prior }).ok()?.half_angle_rad());
+    // Below the limb height, the body is half of all directions.
+    Some([seen_from(high)?, seen_from(low).unwrap_or(FRAC_PI_2)])
 }
 
 /// Returns what is expected of the first body in the picture of a head.

@@ -178,7 +178,15 @@ impl Joiner {
         let mut statuses = heads.iter().filter_map(|head| Some(head.frame?.outcomes.first()?.status()));
         let first = statuses.next().filter(|status| *status != Status::Ok);
         let status = first.filter(|first| statuses.all(|other| other == *first)).unwrap_or(Status::NoLimb);
-        self.row(index, heads, time_s, status, &NoJoint::NoHead.to_string())
+        if status != Status::NoAltitude {
+            return self.row(index, heads, time_s, status, &NoJoint::NoHead.to_string());
+        }
+        // Several heads find the altitude themselves, so only the heads have this status.
+        let detail = format!(
+            "{}; set gates.altitude_limits_km in their sensor.toml to search without an altitude",
+            NoJoint::NoHead
+        );
+        self.row(index, heads, time_s, Status::NoLimb, &detail)
     }
 
     fn answer(&self, index: u64, heads: &[Seen<'_>], time_s: Option<f64>, answer: &EpochAnswer<f64>) -> Row {
@@ -222,7 +230,9 @@ impl Joiner {
             (found.map(|(m, _)| m / 1e3), found.map(|(_, sigma_m)| sigma_m / 1e3))
         };
         (row.altitude_est_km, row.altitude_est_sigma_km) = km(expected.altitude(cos, var_cos));
-        (row.limb_height_est_km, row.limb_height_est_sigma_km) = km(expected.measured_limb_height_m(cos, var_cos));
+        // The middle of `gates.altitude_limits_km` is no altitude from which a limb height could follow.
+        let told = row.altitude_km.and_then(|_| expected.measured_limb_height_m(cos, var_cos));
+        (row.limb_height_est_km, row.limb_height_est_sigma_km) = km(told);
     }
 
     fn set_direction(&self, row: &mut Row, axis: &UnitVec3<Vehicle, f64>, upper_rad2: [f64; 6]) {

@@ -191,7 +191,10 @@ section! {
         @- max_section_residual: Option<f64> = None, [above 0.0] { needs: "dlr", unset: "any", example: "0.025" };
         /// [lowest, highest] altitude, km: the radius of the fitted circle must be that of a limb between them.
         ///
-        /// Wider limits refuse fewer circles; at altitude 0 the radius has no upper limit.
+        /// Wider limits refuse fewer circles; at altitude 0 the radius has no upper limit. If no altitude is given,
+        /// neither in `[body]` nor with the picture, the limb is searched between them: the expected altitude is their
+        /// middle, with half of their distance as 1σ. The answer to a short arc is then coarse, but that of several
+        /// cameras (`hzn run rig.toml`) is not.
         @- altitude_limits_km: Option<[f64; 2]> = None, [0.0 to 1e9]
             { needs: "horace", unset: "any", example: "[0.0, 1000.0]" };
         /// With `altitude_limits_km`: the radius may lie beyond its limits by this fraction of each limit.
