@@ -205,8 +205,8 @@ pub fn check(file: &Rig) -> Result<(), (String, String)> {
         }
         let Some(mount) = &head.mount else {
             let what = "missing: give the attitude of the camera on the rig as q_rig_from_camera_wxyz, from the \
-                        drawing or from a calibration (Kalibr's T_cn_cnm1; `hzn calibrate sky` and `hzn fuse --solve` \
-                        find it from pictures)";
+                        drawing; `hzn init --rig --camchain` takes it from a calibration of Kalibr (T_cn_cnm1), and \
+                        `hzn calibrate rig` corrects it from a flight";
             return refused("mount", what.into());
         };
         let in_mount = |(key, what): (&str, String)| (format!("[[head]] {} mount.{key}", i + 1), what);
