@@ -67,7 +67,7 @@ mod _hzn {
     #[pymodule_export]
     use crate::report::Report;
     #[pymodule_export]
-    use crate::rig::Rig;
+    use crate::rig::{Rig, RigEpoch, RigMemory};
     #[pymodule_export]
     use crate::sensor::Sensor;
     #[pymodule_export]

@@ -1,26 +1,32 @@
 //! `hzn.Rig`.
 
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
+use hzn_core::status::Status;
 use hzn_files::FrameData;
 use hzn_files::rig::{self, Common, Head, HeadMount, JOINT};
-use hzn_run::engine::{BodyOutcome, Finished};
-use hzn_run::rig::{Joiner, Seen};
+use hzn_mcap::{Row, RowMeta};
+use hzn_run::engine::{BodyOutcome, Finished, Unprocessed};
+use hzn_run::rig::{Joiner, Memory, Seen};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::errors;
+use crate::numbered::number;
 use crate::prior::{Prior, utc};
 use crate::read::Read;
 use crate::report::Report;
-use crate::sensor::Sensor;
+use crate::sensor::{Sensor, row_meta};
+use crate::state::State;
 
 #[doc = doc!("Rig")]
 #[pyclass(frozen, module = "hzn")]
 pub(crate) struct Rig {
     sensors: Vec<Py<Sensor>>,
     names: Vec<String>,
-    joiner: Joiner,
+    joiner: Arc<Joiner>,
 }
 
 #[pymethods]
@@ -67,7 +73,7 @@ impl Rig {
         let states: Vec<_> = sensors.iter().map(|sensor| sensor.get().state()).collect();
         let configs = states.iter().map(|state| &state.config);
         let joiner = Joiner::new(&file, configs).map_err(errors::config)?;
-        Ok(Self { sensors, names, joiner })
+        Ok(Self { sensors, names, joiner: Arc::new(joiner) })
     }
 
     #[doc = doc!("Rig.names")]
@@ -106,32 +112,61 @@ impl Rig {
             time_s,
             camera_temperature_c,
         )?;
-        self.check_names(images)?;
-        let mut frames = Vec::with_capacity(self.names.len());
-        let reports = PyDict::new(py);
-        let heads = self.names.iter().zip(&self.sensors).zip(self.joiner.q_vehicle_from_camera_wxyz());
-        for ((name, sensor), q_vehicle_from_camera_wxyz) in heads {
-            let Some(image) = images.get_item(name)?.filter(|image| !image.is_none()) else {
-                frames.push(None);
-                continue;
-            };
-            let state: Arc<_> = sensor.get().state();
-            known.tell_doubts(py, &state.config)?;
-            let read = Read::from_object(py, &state, &image)?;
-            let data = FrameData { time_s: known.data.time_s.or(read.time_s), ..known.data.clone() };
-            let data = FrameData { utc_s: utc(data.time_s), ..data }.seen_by_camera(q_vehicle_from_camera_wxyz);
-            let (report, processed) = read.process(py, &state, &data, bits, false)?;
-            let outcomes = processed.into_iter().map(Into::into).collect();
-            let glimpse = Some(read.glimpse(&state, bits)?);
-            frames.push(Some(Finished { glimpse, ..finished(read.file, data, outcomes) }));
-            reports.set_item(name, Bound::new(py, report)?)?;
+        let epoch = self.see(py, images, &known, bits, false)?;
+        let seen: Vec<Seen<'_>> = epoch.frames.iter().map(|frame| Seen::new(frame.as_ref(), None)).collect();
+        self.answers(py, 0, &epoch, &seen)
+    }
+
+    #[doc = doc!("Rig.process_many")]
+    #[pyo3(signature = (epochs, *, jobs = None, progress = false))]
+    fn process_many<'py>(
+        slf: &Bound<'py, Self>,
+        epochs: &Bound<'py, PyAny>,
+        jobs: Option<usize>,
+        progress: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (py, rig) = (slf.py(), slf.get());
+        let many = py.import("hzn._many")?.getattr("process_epochs")?;
+        let states: Vec<_> = rig.sensors.iter().map(|sensor| sensor.get().state()).collect();
+        if !states.iter().any(|state| state.config.track.is_on()) {
+            // If a picture depends on the previous one, the epochs are processed one after another.
+            let is_serial = states.iter().any(|state| state.config.tracks());
+            return many.call1((slf, epochs, if is_serial { Some(1) } else { jobs }, progress));
         }
-        let seen: Vec<Seen<'_>> = frames.iter().map(|frame| Seen::new(frame.as_ref(), None)).collect();
-        self.joiner.check_times(&seen).map_err(errors::config)?;
-        let all = PyDict::new(py);
-        all.set_item(JOINT, Bound::new(py, Report::from_row(self.joiner.join(0, &seen)))?)?;
-        all.update(reports.as_mapping())?;
-        Ok(all)
+        // Sensors of its own, because single pictures that are processed meanwhile are not of the sequence.
+        let own = |sensor: &Py<Sensor>| Py::new(py, sensor.get().for_sequence()?);
+        let sensors = rig.sensors.iter().map(own).collect::<PyResult<_>>()?;
+        let own = Self { sensors, names: rig.names.clone(), joiner: Arc::clone(&rig.joiner) };
+        many.call1((own, epochs, Some(1), progress))
+    }
+
+    /// Processes the pictures of one epoch of a sequence, in any order and on any thread.
+    #[pyo3(name = "_see")]
+    fn see_epoch(
+        &self,
+        py: Python<'_>,
+        images: &Bound<'_, PyDict>,
+        known: &Prior,
+        bits: Option<u8>,
+    ) -> PyResult<RigEpoch> {
+        Ok(RigEpoch(Mutex::new(Some(self.see(py, images, known, bits, true)?))))
+    }
+
+    /// Joins the answers of the next epoch of a sequence.
+    #[pyo3(name = "_join")]
+    fn join_next<'py>(
+        &self,
+        py: Python<'py>,
+        memory: &RigMemory,
+        epoch: &RigEpoch,
+        index: u64,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let epoch = epoch.0.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let epoch = epoch.ok_or_else(|| errors::other("this epoch is already joined"))?;
+        let mut memory = memory.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let repeats = memory.find_repeats(&epoch.frames, &epoch.digests);
+        let seen = memory.see(&self.joiner, &epoch.frames, &repeats);
+        self.answers(py, index, &epoch, &seen)
     }
 
     fn __repr__(&self) -> String {
@@ -139,7 +174,87 @@ impl Rig {
     }
 }
 
+/// The processed pictures of one epoch.
+struct Pictures {
+    /// In the order of the heads; `None` for a head without a picture.
+    frames: Vec<Option<Finished>>,
+    /// Checksums of their samples.
+    digests: Vec<Option<u32>>,
+    reports: Vec<(String, Report)>,
+}
+
+/// An epoch of a sequence that is not joined yet.
+#[pyclass(frozen, name = "_RigEpoch", module = "hzn._hzn")]
+pub(crate) struct RigEpoch(Mutex<Option<Pictures>>);
+
+/// What a sequence of epochs remembers of the epochs before.
+#[pyclass(frozen, name = "_RigMemory", module = "hzn._hzn")]
+pub(crate) struct RigMemory(Mutex<Memory>);
+
+#[pymethods]
+impl RigMemory {
+    #[new]
+    fn new(rig: &Rig) -> Self {
+        Self(Mutex::new(Memory::new(rig.names.len())))
+    }
+}
+
 impl Rig {
+    /// Processes the pictures of an epoch. Of a `sequence`, a file that cannot be read costs only its head, and the
+    /// samples get checksums.
+    fn see(
+        &self,
+        py: Python<'_>,
+        images: &Bound<'_, PyDict>,
+        known: &Prior,
+        bits: Option<u8>,
+        is_of_sequence: bool,
+    ) -> PyResult<Pictures> {
+        self.check_names(images)?;
+        let mut seen = Pictures { frames: Vec::new(), digests: Vec::new(), reports: Vec::new() };
+        let heads = self.names.iter().zip(&self.sensors).zip(self.joiner.q_vehicle_from_camera_wxyz());
+        for ((name, sensor), q_vehicle_from_camera_wxyz) in heads {
+            let Some(image) = images.get_item(name)?.filter(|image| !image.is_none()) else {
+                seen.frames.push(None);
+                seen.digests.push(None);
+                continue;
+            };
+            let state: Arc<_> = sensor.get().state();
+            known.tell_doubts(py, &state.config)?;
+            let data = FrameData { utc_s: utc(known.data.time_s), ..known.data.clone() };
+            let data = data.seen_by_camera(q_vehicle_from_camera_wxyz);
+            let file = image.extract::<PathBuf>().ok().filter(|_| is_of_sequence);
+            let processed = see_picture(py, &state, &image, &data, bits, is_of_sequence);
+            let (frame, digest, report) = match (file, processed) {
+                (Some(file), Err(why)) if why.is_instance_of::<errors::ImageError>(py) => {
+                    unreadable(py, &state, &file, data, &why)
+                }
+                (_, processed) => processed?,
+            };
+            seen.frames.push(Some(frame));
+            seen.digests.push(digest);
+            seen.reports.push((name.clone(), report));
+        }
+        Ok(seen)
+    }
+
+    /// Joins the answers of the heads.
+    fn answers<'py>(
+        &self,
+        py: Python<'py>,
+        index: u64,
+        epoch: &Pictures,
+        seen: &[Seen<'_>],
+    ) -> PyResult<Bound<'py, PyDict>> {
+        self.joiner.check_times(seen).map_err(errors::config)?;
+        let all = PyDict::new(py);
+        all.set_item(JOINT, Bound::new(py, Report::from_row(self.joiner.join(index, seen)))?)?;
+        for (name, report) in &epoch.reports {
+            all.set_item(name, Bound::new(py, number(py, report, index)?)?)?;
+        }
+        Ok(all)
+    }
+
     /// Refuses a picture of a head that the rig does not have.
     fn check_names(&self, images: &Bound<'_, PyDict>) -> PyResult<()> {
         for name in images.keys() {
@@ -152,6 +267,38 @@ impl Rig {
         }
         Ok(())
     }
+}
+
+/// A processed picture, the checksum of its samples, and its report.
+type Processed = (Finished, Option<u32>, Report);
+
+fn see_picture(
+    py: Python<'_>,
+    state: &Arc<State>,
+    image: &Bound<'_, PyAny>,
+    data: &FrameData,
+    bits: Option<u8>,
+    is_of_sequence: bool,
+) -> PyResult<Processed> {
+    let read = Read::from_object(py, state, image)?;
+    let time_s = data.time_s.or(read.time_s);
+    let data = FrameData { time_s, utc_s: utc(time_s), ..data.clone() };
+    let (report, processed) = read.process(py, state, &data, bits, false)?;
+    let outcomes = processed.into_iter().map(Into::into).collect();
+    let glimpse = Some(read.glimpse(state, bits)?);
+    let digest = is_of_sequence.then(|| read.digest()).transpose()?;
+    Ok((Finished { glimpse, ..finished(read.file, data, outcomes) }, digest, report))
+}
+
+/// Returns what remains of a picture file that could not be read.
+fn unreadable(py: Python<'_>, state: &State, file: &Path, data: FrameData, why: &PyErr) -> Processed {
+    let file = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let why = Unprocessed { status: Status::Unreadable, why: why.value(py).to_string(), prior: None };
+    let body = state.config.each_body().first().cloned().unwrap_or_default();
+    let meta = RowMeta { file: file.clone(), ..row_meta(&data, &body) };
+    let report = Report::from_row(Row::unprocessed(&meta, why.status, &why.why));
+    let outcomes = vec![BodyOutcome { report: Err(why), elapsed: Duration::ZERO }];
+    (finished(file, data, outcomes), None, report)
 }
 
 /// Returns the picture of a head as the joint answer takes it.

@@ -38,6 +38,12 @@ impl Sensor {
         Ok(Self { state: RwLock::new(State::new(config, flight)?) })
     }
 
+    /// Returns a sensor for one sequence, see [`State::for_sequence`].
+    pub(crate) fn for_sequence(&self) -> PyResult<Self> {
+        let state = self.state();
+        Ok(Self { state: RwLock::new(State::for_sequence(state.config.clone(), state.flight)?) })
+    }
+
     /// Returns the current state. A later change of the parameters does not affect calls in progress.
     pub(crate) fn state(&self) -> Arc<State> {
         Arc::clone(&self.state.read().unwrap_or_else(PoisonError::into_inner))
@@ -230,8 +236,7 @@ impl Sensor {
             return many.call1((slf, images, if state.config.tracks() { Some(1) } else { jobs }, progress));
         }
         // A sensor of its own, because single pictures that are processed meanwhile are not of the sequence.
-        let own = Self { state: RwLock::new(State::for_sequence(state.config.clone(), state.flight)?) };
-        many.call1((own, images, Some(1), progress))
+        many.call1((slf.get().for_sequence()?, images, Some(1), progress))
     }
 
     fn __repr__(&self) -> String {
@@ -287,6 +292,11 @@ fn warn_of_unused_bits(py: Python<'_>, array: &Array<'_>, bits: Option<u8>) -> P
 }
 
 impl<'py> Read<'py> {
+    /// Returns a checksum of the samples, which tells a picture from another one.
+    pub(crate) fn digest(&self) -> PyResult<u32> {
+        Ok(hzn_run::rig::digest(&Array::from_object(&self.image)?.to_samples()))
+    }
+
     /// Reads the brightness at places all over the picture, after [`Self::process`] accepted it.
     pub(crate) fn glimpse(&self, state: &State, bits: Option<u8>) -> PyResult<Glimpse> {
         let array = Array::from_object(&self.image)?;
@@ -344,7 +354,7 @@ impl<'py> Read<'py> {
 }
 
 /// Returns the data of a picture for its row.
-fn row_meta(data: &FrameData, body: &hzn_core::body::Config) -> RowMeta {
+pub(crate) fn row_meta(data: &FrameData, body: &hzn_core::body::Config) -> RowMeta {
     RowMeta {
         time_s: Some(data.time_s.unwrap_or(0.0)),
         body: body.kind.name().to_owned(),

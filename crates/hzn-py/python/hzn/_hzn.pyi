@@ -309,6 +309,48 @@ class Rig:
             pictures are more than 0.1 s apart and no ``time_s`` is given.
         """
 
+    def process_many(
+        self,
+        epochs: Iterable[
+            Mapping[str, _Picture | _Path | None] | tuple[Mapping[str, _Picture | _Path | None], Mapping[str, Any]]
+        ],
+        *,
+        jobs: int | None = None,
+        progress: bool = False,
+    ) -> Iterator[dict[str, Report]]:
+        """Process a sequence of epochs on all cores. The answers come in order while it runs.
+
+        In a sequence the rig knows the epochs before. A head whose picture has the samples of its picture before, or
+        of another head, is excluded (``heads_excluded``), unless both have the same ``time_s`` or there is no limb in
+        it. The coarse direction takes a place for lit by the last limb that its head found, as ``hzn run`` does.
+
+        Parameters
+        ----------
+        epochs
+            For each epoch a dictionary of pictures as for `process`; or pairs of it and a dictionary of keyword
+            arguments of `process` (``altitude_km`` and so on). An iterable is read only as fast as it is processed.
+        jobs
+            Number of threads; without it, one per core. If a head has ``threshold.method = "track"`` or
+            ``track.full_every``, there is only one.
+        progress
+            Show a progress bar (needs the package tqdm).
+
+        Yields
+        ------
+        dict
+            As `process` returns it, with the number of the epoch as `Report.index`. A picture file that cannot be read
+            costs only its head, which has the status ``unreadable``. An array that is refused raises as in `process`,
+            after the answers before it.
+
+        Raises
+        ------
+        ConfigError
+            As for `process`, or ``jobs`` is below 1.
+        """
+
+    def _see(self, images: Mapping[str, _Picture | _Path | None], known: _Prior, bits: int | None) -> _RigEpoch: ...
+    def _join(self, memory: _RigMemory, epoch: _RigEpoch, index: int) -> dict[str, Report]: ...
+
 @final
 class Sensor:
     """A horizon sensor.
@@ -1379,6 +1421,12 @@ class _Sequence:
 
 @final
 class _Item: ...
+@final
+class _RigEpoch: ...
+@final
+class _RigMemory:
+    def __new__(cls, rig: Rig) -> _RigMemory: ...
+
 @final
 class _Prior:
     def __new__(

@@ -9,28 +9,69 @@ from __future__ import annotations
 import os
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing
 from itertools import chain
 from queue import SimpleQueue
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
 
-from ._hzn import ConfigError, Report, Sensor, _number, _Sequence
+from ._hzn import ConfigError, Report, Rig, Sensor, _number, _Prior, _RigEpoch, _RigMemory, _Sequence
 
 _TASK_S = 2e-3
 _TASK_BYTES = 8 << 20
 _TASK_ITEMS = 32
 _NOTHING = object()
+_Done = TypeVar("_Done")
 
 
 def process_many(sensor: Sensor, images: Any, jobs: int | None, progress: bool) -> Iterator[Report]:
     """Implement `Sensor.process_many`."""
-    if jobs is not None and jobs < 1:
-        raise ConfigError(f"jobs: {jobs} is refused: must be 1 or more")
+    threads = _threads(jobs)
     work, items, total = _work(sensor, images)
-    threads = jobs or len(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1))
     reports = _in_order(work, items, threads)
     return _with_bar(reports, total) if progress else reports
+
+
+def process_epochs(rig: Rig, epochs: Any, jobs: int | None, progress: bool) -> Iterator[dict[str, Report]]:
+    """Implement `Rig.process_many`."""
+    threads = _threads(jobs)
+
+    def see(numbered: _Numbered) -> _RigEpoch:
+        images, known = numbered.item if isinstance(numbered.item, tuple) else (numbered.item, {})
+        return rig._see(images, *_known(dict(known)))
+
+    total = len(epochs) if hasattr(epochs, "__len__") else None
+    items = (_Numbered(index, item) for index, item in enumerate(epochs))
+    answers = _join(rig, _in_order(see, items, threads))
+    return _with_bar(answers, total) if progress else answers
+
+
+def _known(known: dict[str, Any]) -> tuple[_Prior, int | None]:
+    """Check the keyword arguments of an epoch as those of `Rig.process`."""
+    bits = known.pop("bits", None)
+    try:
+        for name in ("range_km", "range_sigma_km", "pole"):
+            if name in known:
+                raise TypeError(f"_Prior.__new__() got an unexpected keyword argument '{name}'")
+        return _Prior(**known), bits
+    except TypeError as error:
+        raise TypeError(str(error).replace("_Prior.__new__()", "Rig.process()")) from None
+
+
+def _join(rig: Rig, epochs: Generator[_RigEpoch, None, None]) -> Iterator[dict[str, Report]]:
+    """Join the epochs in their order: a picture that repeats the one before is known only then."""
+    memory = _RigMemory(rig)
+    with closing(epochs):
+        for index, epoch in enumerate(epochs):
+            yield rig._join(memory, epoch, index)
+
+
+def _threads(jobs: int | None) -> int:
+    """Check the number of threads; without it, there is one per core."""
+    if jobs is not None and jobs < 1:
+        raise ConfigError(f"jobs: {jobs} is refused: must be 1 or more")
+    return jobs or len(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1))
 
 
 def _work(sensor: Sensor, images: Any) -> tuple[Callable[[Any], Report], Iterable[Any], int | None]:
@@ -58,7 +99,9 @@ class _Numbered:
     def __init__(self, index: int, item: Any) -> None:
         self.index = index
         self.item = item
-        self.nbytes: int = getattr(item[0] if isinstance(item, tuple) else item, "nbytes", 0)
+        given = item[0] if isinstance(item, tuple) else item
+        pictures = given.values() if isinstance(given, dict) else [given]
+        self.nbytes: int = sum(getattr(picture, "nbytes", 0) for picture in pictures)
 
 
 def _files(
@@ -69,15 +112,15 @@ def _files(
 
 
 class _Task:
-    """Some items, the error that follows them, and later their reports."""
+    """Some items, the error that follows them, and later what became of them: reports, or epochs of a rig."""
 
     def __init__(self) -> None:
         self.items: list[Any] = []
         self.error: BaseException | None = None
         """Raised after the reports of the task."""
-        self.done: SimpleQueue[list[Report]] = SimpleQueue()
+        self.done: SimpleQueue[list[Any]] = SimpleQueue()
 
-    def reports(self) -> Iterator[Report]:
+    def reports(self) -> Iterator[Any]:
         """Wait for the reports."""
         yield from self.done.get()
         if self.error is not None:
@@ -92,7 +135,7 @@ class _Shared:
     """Recent time per item, seconds; at first the longest time of a task."""
 
 
-def _in_order(work: Callable[[Any], Report], items: Iterable[Any], threads: int) -> Iterator[Report]:
+def _in_order(work: Callable[[Any], _Done], items: Iterable[Any], threads: int) -> Generator[_Done, None, None]:
     tasks: SimpleQueue[_Task | None] = SimpleQueue()
     pending: deque[_Task] = deque()
     shared = _Shared()
@@ -144,10 +187,10 @@ def _tasks(items: Iterable[Any], shared: _Shared) -> Iterator[_Task]:
             return
 
 
-def _run_tasks(work: Callable[[Any], Report], tasks: SimpleQueue[_Task | None], shared: _Shared) -> None:
+def _run_tasks(work: Callable[[Any], Any], tasks: SimpleQueue[_Task | None], shared: _Shared) -> None:
     """Run the tasks; the function of each thread."""
     while (task := tasks.get()) is not None:
-        reports: list[Report] = []
+        reports: list[Any] = []
         begun = perf_counter()
         try:
             for item in task.items:
@@ -161,7 +204,7 @@ def _run_tasks(work: Callable[[Any], Report], tasks: SimpleQueue[_Task | None], 
         task.done.put(reports)
 
 
-def _with_bar(reports: Iterator[Report], total: int | None) -> Iterator[Report]:
+def _with_bar(reports: Iterator[_Done], total: int | None) -> Iterator[_Done]:
     try:
         from tqdm.auto import tqdm
     except ImportError:

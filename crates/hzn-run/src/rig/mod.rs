@@ -9,6 +9,7 @@ mod coarse;
 mod epochs;
 mod joint;
 mod levels;
+mod memory;
 mod mounts;
 mod open;
 mod plan;
@@ -19,6 +20,7 @@ mod sync;
 
 pub use epochs::{Epoch, Epochs};
 pub use joint::Joiner;
+pub use memory::{Memory, digest};
 pub use open::{OpenHead, Opened, Request, open};
 pub use plan::{FinishedEpoch, HeadPlan, Plan, look, run};
 pub use resume::{go_to, run_again_from};

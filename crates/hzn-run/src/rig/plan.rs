@@ -2,13 +2,12 @@
 
 use std::sync::atomic::AtomicBool;
 
-use hzn_core::status::Status;
 use hzn_mcap::{FrameRecord, Row, Stamp};
 
 use super::epochs::{Epoch, Epochs};
 use super::joint::Joiner;
-use super::levels::Levels;
-use super::seen::{Repeat, Seen};
+use super::memory::Memory;
+use super::seen::Repeat;
 use super::start::Start;
 use crate::engine::{self, AnySensor, End, Finished, InOrder, Sink, Turns, Work, run_in_order};
 use crate::error::Error;
@@ -94,8 +93,7 @@ struct Order<'a> {
     plan: &'a Plan,
     /// The turns of each head.
     turns: Vec<Turns>,
-    frozen: Frozen,
-    levels: Levels,
+    memory: Memory,
 }
 
 impl<'a> Order<'a> {
@@ -105,30 +103,26 @@ impl<'a> Order<'a> {
         Self {
             plan,
             turns,
-            frozen: Frozen { last: vec![None; plan.heads.len()] },
-            levels: start.levels.unwrap_or_else(|| Levels::new(plan.heads.len())),
+            memory: match start.levels {
+                Some(levels) => Memory::with_levels(levels, plan.heads.len()),
+                None => Memory::new(plan.heads.len()),
+            },
         }
     }
 
     /// Judges the pictures of the heads, and joins their answers.
     fn join(&mut self, index: u64, heads: &mut [Option<Finished>]) -> (Row, Vec<Option<Repeat>>) {
-        let repeats = self.frozen.see(heads);
+        let digest = |frame: &Option<Finished>| Some(crc32fast::hash(frame.as_ref()?.picture.as_ref()?));
+        let digests: Vec<_> = heads.iter().map(digest).collect();
+        let repeats = self.memory.find_repeats(heads, &digests);
         for (frame, (turns, head)) in heads.iter_mut().zip(self.turns.iter_mut().zip(&self.plan.heads)) {
             if let Some(frame) = frame {
                 turns.judge(frame, &head.plan.config);
                 frame.picture = frame.picture.take().filter(|_| self.plan.keep_pictures);
             }
         }
-        let levels = &mut self.levels;
-        let levels: Vec<_> = heads
-            .iter()
-            .enumerate()
-            .map(|(k, frame)| levels.see(k, self.plan.joiner.level(k, frame.as_ref())))
-            .collect();
-        let views = heads.iter().zip(&repeats).zip(levels);
-        let views: Vec<Seen<'_>> =
-            views.map(|((frame, repeats), level)| Seen::new(frame.as_ref(), *repeats).with_level(level)).collect();
-        (self.plan.joiner.join(index, &views), repeats)
+        let seen = self.memory.see(&self.plan.joiner, heads, &repeats);
+        (self.plan.joiner.join(index, &seen), repeats)
     }
 }
 
@@ -171,38 +165,9 @@ impl Work for Plan {
         let one = |((head, sensor), picture): ((&HeadPlan, &mut AnySensor), Option<_>)| {
             let Some((number, item)) = picture else { return Ok(None) };
             // The row has the number of the epoch, so that it stands with the rows of the other heads. Repeated
-            // pictures are found in all heads at once, by `Frozen`.
+            // pictures are found in all heads at once, by [`Memory`].
             head.plan.process(sensor, number, item).map(|frame| Some(Finished { index, bytes: None, ..frame }))
         };
         Ok((index, heads.map(one).collect::<Result<_, Error>>()?))
-    }
-}
-
-/// Finds heads that repeat a picture.
-struct Frozen {
-    /// Time and checksum of the last picture of each head.
-    last: Vec<Option<(Option<f64>, u32)>>,
-}
-
-impl Frozen {
-    /// Returns which pictures of an epoch have the bytes of the picture before, or of another head. The noise of a
-    /// camera never repeats, but a dark or clipped picture has none: a picture without an answer never counts, so that
-    /// its own reason is reported.
-    fn see(&mut self, heads: &[Option<Finished>]) -> Vec<Option<Repeat>> {
-        let checksum = |frame: &Finished| Some((frame.time_s, crc32fast::hash(frame.picture.as_ref()?)));
-        let now: Vec<_> = heads.iter().map(|frame| frame.as_ref().and_then(checksum)).collect();
-        let is_answered = |frame: &Finished| frame.outcomes.first().is_some_and(|o| o.status() == Status::Ok);
-        let repeat = |(k, frame): (usize, &Option<Finished>)| {
-            let (now_s, own) = frame.as_ref().filter(|frame| is_answered(frame)).and_then(checksum)?;
-            let others = now.iter().enumerate().filter(|(other, _)| *other != k).filter_map(|(_, seen)| *seen);
-            if others.map(|(_, other)| other).any(|other| other == own) {
-                return Some(Repeat::OtherHead);
-            }
-            let (before_s, before) = self.last.get(k).copied().flatten()?;
-            (own == before && now_s != before_s).then_some(Repeat::Before)
-        };
-        let repeats = heads.iter().enumerate().map(repeat).collect();
-        self.last = now;
-        repeats
     }
 }
