@@ -1,6 +1,7 @@
 //! What hzn is built from: licences, sources, and the list of its parts.
 
 use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 use hzn_supply::{self as supply, Package};
 
@@ -89,25 +90,90 @@ fn the_page_is_built_without_c() {
     assert!(needs_c(&tree(&["hzn-cli"])), "the command has zstd; otherwise the lines above look for another name");
 }
 
+/// Dependencies that the sources of their package need not name, with the reason.
+const UNNAMED: [(&str, &str, &str); 3] = [
+    ("hzn-mps2", "cortex-m", "its feature critical-section-single-core stops interrupts for the other crates"),
+    ("hzn-run", "kamadak-exif", "its library is called exif"),
+    ("hzn-stm32f405", "cortex-m", "as for hzn-mps2"),
+];
+
 /// A dependency that nothing uses would be kept up to date for nothing.
 #[test]
 fn every_dependency_of_the_workspace_is_used() {
-    let manifest: toml::Table = std::fs::read_to_string(supply::root().join("Cargo.toml")).unwrap().parse().unwrap();
+    let manifest = read_manifest(&supply::root());
     let members = manifest["workspace"]["members"].as_array().unwrap().iter().map(|m| m.as_str().unwrap());
     let folders = members.flat_map(|member| match member.strip_suffix("/*") {
-        Some(folder) => {
-            let entries = std::fs::read_dir(supply::root().join(folder)).unwrap();
-            entries.map(|entry| entry.unwrap().path()).collect()
-        }
+        Some(folder) => folders(&supply::root().join(folder)),
         None => vec![supply::root().join(member)],
     });
     let mut used = BTreeSet::new();
-    for text in folders.filter_map(|folder| std::fs::read_to_string(folder.join("Cargo.toml")).ok()) {
-        used.extend(text.parse::<toml::Table>().map(dependencies).unwrap());
+    let mut unnamed = Vec::new();
+    for folder in folders.filter(|folder| folder.join("Cargo.toml").exists()) {
+        let manifest = read_manifest(&folder);
+        let package = manifest["package"]["name"].as_str().unwrap().to_owned();
+        let only_a_feature = features_of_dependencies(&manifest);
+        let mut sources = String::new();
+        add_sources(&folder, &mut sources);
+        for name in dependencies(manifest) {
+            if !only_a_feature.contains(&format!("dep:{name}")) && !has_name(&sources, &name.replace('-', "_")) {
+                unnamed.push((package.clone(), name.clone()));
+            }
+            used.insert(name);
+        }
     }
     let listed = manifest["workspace"]["dependencies"].as_table().unwrap();
     let unused: Vec<_> = listed.keys().filter(|name| !used.contains(*name)).collect();
     assert!(unused.is_empty() && used.len() > 50, "{unused:?}");
+    unnamed.sort();
+    let stated: Vec<_> = UNNAMED.iter().map(|(package, name, _)| ((*package).to_owned(), (*name).to_owned())).collect();
+    assert_eq!(unnamed, stated, "no source file of these packages names the dependency");
+}
+
+fn read_manifest(folder: &Path) -> toml::Table {
+    std::fs::read_to_string(folder.join("Cargo.toml")).unwrap().parse().unwrap()
+}
+
+fn folders(folder: &Path) -> Vec<PathBuf> {
+    std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_dir()).collect()
+}
+
+/// Returns the dependencies of the wheel that are there only to have the features that they have in the tests.
+fn features_of_dependencies(manifest: &toml::Table) -> Vec<String> {
+    let feature = manifest.get("features").and_then(|features| features.get("as-in-the-tests"));
+    let listed = feature.and_then(toml::Value::as_array).into_iter().flatten();
+    listed.map(|name| name.as_str().unwrap().to_owned()).collect()
+}
+
+/// Adds the source files of a package, but not those of a package inside of its folder.
+fn add_sources(folder: &Path, sources: &mut String) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() && !path.join("Cargo.toml").exists() && !path.ends_with("target") {
+            add_sources(&path, sources);
+        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            sources.push_str(&std::fs::read_to_string(path).unwrap());
+            sources.push('\n');
+        }
+    }
+}
+
+/// Returns whether code has a name as a whole word. A comment counts only if it has a path, as examples in it have:
+/// `either` and `log` are words, too.
+fn has_name(sources: &str, name: &str) -> bool {
+    let is_part = |c: char| c.is_alphanumeric() || c == '_';
+    sources.lines().any(|line| {
+        let is_comment = line.trim_start().starts_with("//");
+        line.match_indices(name).any(|(at, _)| {
+            let (before, after) = (&line[..at], &line[at + name.len()..]);
+            !before.ends_with(is_part) && !after.starts_with(is_part) && (!is_comment || after.starts_with("::"))
+        })
+    })
+}
+
+#[test]
+fn a_name_is_a_whole_word_of_code() {
+    assert!(has_name("use approx::abs;", "approx") && has_name("    /// use approx::abs;", "approx"));
+    assert!(!has_name("// is approx. 3\nlet approx_3 = approximate(3);\nmy_approx();", "approx"));
 }
 
 /// Returns the names of all dependencies of a manifest, also of those for some systems, for tests and for builds.
