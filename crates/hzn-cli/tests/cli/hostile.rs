@@ -163,6 +163,25 @@ fn eight_bombs_at_eight_threads_stay_small() {
     }
 }
 
+/// A TIFF of the right size may have one compressed strip of any size. Its decoder may take the samples twice and
+/// 16 MiB, so the strip may take the samples and 16 MiB.
+#[test]
+fn a_strip_has_at_most_the_memory_of_its_picture() {
+    let zeros = compressed_zeros(1 << 20);
+    let place = Place::with_pictures(0);
+    for (name, length) in [("a.tif", 320 * 240 + (16 << 20)), ("b.tif", 320 * 240 + (16 << 20) + 1)] {
+        let kind = [(256, 4, 1, 320), (257, 4, 1, 240), (258, 3, 1, 8), (259, 3, 1, 8), (262, 3, 1, 1)];
+        let strip = [(273, 4, 1, u32::MAX), (277, 3, 1, 1), (278, 4, 1, 240), (279, 4, 1, length)];
+        let mut data = zeros.clone();
+        data.resize(length as usize, 0);
+        place.write(&format!("in/{name}"), &tiff(&[&kind[..], &strip].concat(), &data));
+    }
+    let rows = rows(&place.run(&["run", "in"]).expect(3).out);
+    assert_eq!(rows.iter().map(|row| cell(row, "status")).collect::<Vec<_>>(), ["no-limb", "unreadable"]);
+    let why = "TIFF needs more memory than a picture of its size should: above 16 MB";
+    assert_eq!(cell(&rows[1], "detail"), why);
+}
+
 /// Without the memory that all threads share, eight pictures take eight times the memory of one.
 #[test]
 #[cfg(target_os = "linux")]
@@ -298,25 +317,6 @@ fn texts_that_a_spreadsheet_would_compute_begin_with_an_apostrophe() {
     place.run(&["simulate", "scene.toml", "-o", "sim"]).expect(2).says("and not begin with '-'");
 }
 
-#[test]
-#[cfg(unix)]
-fn a_circle_of_links_ends() {
-    let place = Place::with_pictures(2);
-    std::fs::create_dir_all(place.path("in/a/b")).unwrap();
-    std::fs::rename(place.path("in/0001.png"), place.path("in/a/b/0001.png")).unwrap();
-    for link in ["in/a/up", "in/a/b/up", "in/a/b/again"] {
-        std::os::unix::fs::symlink(place.path("in"), place.path(link)).unwrap();
-    }
-    let ran = place.run(&["run", "in/**/*.png", "-s", "in/sensor.toml", "-o", "out.csv"]).expect(0);
-    assert!(!ran.err.contains("left out"), "{}", ran.err);
-    let rows = place.rows("out.csv");
-    assert_eq!(rows.iter().map(|row| cell(row, "file")).collect::<Vec<_>>(), ["in/0000.png", "in/a/b/0001.png"]);
-}
-
-/// Makes a library that lets calls of the system fail when it is loaded before the program. Returns `false` without a C
-/// compiler.
-#[cfg(target_os = "linux")]
-fn make_failing_calls(place: &Place) -> bool {
 /// hzn writes only some of the texts, but a recording of somebody else may have anything in all of them.
 #[test]
 fn no_text_of_a_recording_is_a_formula_in_its_table() {
@@ -348,6 +348,25 @@ fn no_text_of_a_recording_is_a_formula_in_its_table() {
     assert_eq!(place.read("a.jsonl"), place.read("b.jsonl"));
 }
 
+#[test]
+#[cfg(unix)]
+fn a_circle_of_links_ends() {
+    let place = Place::with_pictures(2);
+    std::fs::create_dir_all(place.path("in/a/b")).unwrap();
+    std::fs::rename(place.path("in/0001.png"), place.path("in/a/b/0001.png")).unwrap();
+    for link in ["in/a/up", "in/a/b/up", "in/a/b/again"] {
+        std::os::unix::fs::symlink(place.path("in"), place.path(link)).unwrap();
+    }
+    let ran = place.run(&["run", "in/**/*.png", "-s", "in/sensor.toml", "-o", "out.csv"]).expect(0);
+    assert!(!ran.err.contains("left out"), "{}", ran.err);
+    let rows = place.rows("out.csv");
+    assert_eq!(rows.iter().map(|row| cell(row, "file")).collect::<Vec<_>>(), ["in/0000.png", "in/a/b/0001.png"]);
+}
+
+/// Makes a library that lets calls of the system fail when it is loaded before the program. Returns `false` without a C
+/// compiler.
+#[cfg(target_os = "linux")]
+fn make_failing_calls(place: &Place) -> bool {
     let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/failing_calls.c");
     let mut cc = std::process::Command::new("cc");
     cc.args(["-shared", "-fPIC", "-O1", "-o"]).arg(place.path("calls.so")).arg(source).arg("-ldl");

@@ -193,3 +193,25 @@ fn explain(error: &image::ImageError, format: ImageFormat, budget: u64) -> Strin
         _ => format!("{name} cannot be decoded: {text}"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_decoder_may_take_what_its_format_needs() {
+        let times = |format, is_progressive| {
+            let budget = budget(1_000_000, format, jpeg::Structure { is_progressive, scans: 1 });
+            (budget - SLACK) as f64 / 1e6
+        };
+        for format in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Bmp, ImageFormat::Pnm] {
+            assert_eq!(times(format, false), 1.0, "{format:?}");
+        }
+        assert_eq!(times(ImageFormat::Jpeg, true), 3.0);
+        assert_eq!((times(ImageFormat::Tiff, false), times(ImageFormat::WebP, false)), (2.0, 3.0));
+        // Of a picture without pixels, a header is left.
+        assert_eq!(budget(0, ImageFormat::WebP, jpeg::Structure::default()), SLACK);
+        // The largest picture that is accepted has a budget, too.
+        assert_eq!(budget(MAX_BYTES, ImageFormat::WebP, jpeg::Structure::default()), 3 * MAX_BYTES + SLACK);
+    }
+}
