@@ -7,7 +7,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::machine::output;
+use crate::machine::{self, output};
 use crate::steps::{self, Outcome, Trouble};
 
 /// The tests of hzn-core that Miri runs in about half a minute, by parts of their names. All others take hours.
@@ -42,6 +42,9 @@ const FLIGHT: &[&str] = &[
 /// Miri cannot run the square root of libm for x86-64, which is assembly; this feature of libm takes the portable one.
 const PORTABLE_ROOTS: &str = "libm/force-soft-floats";
 
+/// Files and the clock can be read.
+const FLAGS: &str = "-Zmiri-disable-isolation";
+
 /// A processor with the most significant byte first. Miri interprets it on any machine.
 const BIG_ENDIAN: &str = "s390x-unknown-linux-gnu";
 
@@ -52,7 +55,7 @@ pub(crate) fn test(all: bool) -> Outcome {
         println!("It comes with: rustup toolchain install nightly --component miri,rust-src");
         return Ok(());
     }
-    steps::run(&mut miri(&["--package", "hzn-twice"]))?;
+    steps::run(miri(&["--package", "hzn-twice"]).env("MIRIFLAGS", format!("{FLAGS} {}", barrier()?)))?;
     if all {
         let core = ["--package", "hzn-core", "--lib", "--features", PORTABLE_ROOTS];
         steps::run(miri(&core).arg("--").args(CORE))?;
@@ -72,17 +75,31 @@ pub(crate) fn campaign() -> Outcome {
     steps::run(miri(&with_core("hzn-flight")).args(["--lib", "--"]).args(FLIGHT))
 }
 
+/// Builds the function that hzn-twice calls in Miri, and returns the flag with which Miri finds it.
+fn barrier() -> Result<String, Trouble> {
+    let folder = machine::target().join("miri");
+    std::fs::create_dir_all(&folder)?;
+    let library = folder.join("barrier.so");
+    let source = "crates/hzn-twice/miri/barrier.rs";
+    steps::run(nightly(&["rustc", "--edition", "2024", "--crate-type", "cdylib", source, "-o"]).arg(&library))?;
+    Ok(format!("-Zmiri-native-lib={}", library.display()))
+}
+
 /// Returns a run of tests in Miri. They may read files and the clock.
 fn miri(args: &[&str]) -> Command {
     let mut command = nightly(&["cargo", "miri", "test", "--locked"]);
     // A property is tried on few inputs, because the interpreter is a thousand times as slow as the processor.
     command.args(args).env("PROPTEST_CASES", "4");
-    command.env_remove("RUSTC").env("MIRIFLAGS", "-Zmiri-disable-isolation");
+    command.env_remove("RUSTC").env("MIRIFLAGS", FLAGS);
     command
 }
 
-/// Returns whether Miri and the sources that it interprets are here. Without the sources Miri would download them.
+/// Returns whether Miri and the sources that it interprets are here. Without the sources Miri would download them. It
+/// calls functions outside of the program on Unix only, and hzn-twice needs one.
 fn has_miri() -> bool {
+    if !cfg!(unix) {
+        return false;
+    }
     let sysroot = output(&mut nightly(&["rustc", "--print", "sysroot"]));
     let has_sources = sysroot.is_some_and(|path| Path::new(&path).join("lib/rustlib/src/rust/library").is_dir());
     has_sources && output(&mut nightly(&["cargo", "miri", "--version"])).is_some()

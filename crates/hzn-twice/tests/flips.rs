@@ -29,7 +29,7 @@ fn count_seen<T>(value: T) -> (usize, usize) {
 }
 
 #[test]
-#[cfg_attr(miri, ignore = "a sensor has unused bytes, which only assembly can initialise")]
+#[cfg_attr(miri, ignore = "a sensor has unused bytes, and this program has no barrier under Miri")]
 fn every_flipped_bit_is_seen() {
     let mut config = Config::new(camera::Config::ideal(camera::Model::Pinhole, 160, 120, 150.0));
     config.body.altitude_km = Some(230.0);
