@@ -28,6 +28,7 @@ const CORE: &[&str] = &[
 /// The modules of hzn-flight that have tests.
 const FLIGHT: &[&str] = &[
     "answer::",
+    "attitude::",
     "authentication::",
     "cuc::",
     "flight::",
