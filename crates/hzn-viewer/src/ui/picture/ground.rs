@@ -14,15 +14,17 @@ use crate::work::ground::{NamedLine, Vertical, vertical};
 /// Shortest part of a line that has a label, in points.
 const LABELLED: f32 = 60.0;
 
-/// Draws the layers that are switched on. Returns what the local vertical says about the camera.
+/// Draws the layers that are switched on, with names that avoid what is taken. Returns what the local vertical says
+/// about the camera.
 pub(super) fn draw(
     viewer: &Viewer,
     painter: &Painter,
     frame_view: &FrameView,
     outcome: &Outcome,
     placement: &Placement<'_>,
+    taken: &[Rect],
 ) -> Option<String> {
-    let mut taken = Vec::new();
+    let mut taken = taken.to_vec();
     if viewer.settings.shows(Layer::Grid)
         && let Some(grid) = frame_view.grid()
     {

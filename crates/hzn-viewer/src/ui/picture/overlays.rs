@@ -44,9 +44,10 @@ pub(super) fn draw(
             dashed_ellipse(painter, ellipse, placement);
         }
     }
-    let vertical = ground::draw(viewer, painter, frame_view, outcome, placement);
+    taken.extend(outcome.bodies.iter().filter_map(|b| arrow(viewer, painter, b, placement)).map(|arrow| arrow.area()));
+    let vertical = ground::draw(viewer, painter, frame_view, outcome, placement, taken);
     for answer in &outcome.bodies {
-        taken.extend(body(viewer, painter, answer, placement));
+        body(viewer, painter, answer, placement);
     }
     if on(Layer::Truth) {
         for truth in viewer.truth.get(&frame_view.name).into_iter().flatten() {
@@ -84,8 +85,15 @@ fn draw_sky(viewer: &Viewer, painter: &Painter, frame_view: &FrameView, outcome:
     }
 }
 
-/// Draws the result of a body. Returns the place of the arrow to an axis outside of the picture.
-fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Placement<'_>) -> Option<Rect> {
+/// Returns the arrow to an axis that is outside of the picture, if the axis is shown.
+fn arrow(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Placement<'_>) -> Option<Arrow> {
+    let is_inside = |p: &Point| (0..2).all(|i| (-0.5..placement.size[i] - 0.5).contains(&p[i]));
+    let is_shown = viewer.settings.shows(Layer::Axis) && answer.axis.filter(is_inside).is_none();
+    if is_shown { Arrow::new(painter, placement, answer) } else { None }
+}
+
+/// Draws the result of a body.
+fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Placement<'_>) {
     let on = |layer| viewer.settings.shows(layer);
     let dot = (placement.scale() as f32 * 0.5).clamp(0.9, 5.0);
     if on(Layer::Edges) {
@@ -125,16 +133,11 @@ fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Pla
         // The dots are narrower than the line of the limb, so that both are seen.
         dots(painter, points(true), dot, theme::INLIER);
     }
-    let inside = |p: &Point| (0..2).all(|i| (-0.5..placement.size[i] - 0.5).contains(&p[i]));
-    if !on(Layer::Axis) {
-        return None;
-    }
-    if answer.axis.filter(inside).is_none() {
-        let arrow = Arrow::new(painter, placement, answer)?;
+    if let Some(arrow) = arrow(viewer, painter, answer, placement) {
         arrow.draw(painter);
-        return Some(arrow.area());
-    }
-    if let Some(at) = answer.axis.filter(inside).and_then(|p| placement.to_screen(p)) {
+    } else if on(Layer::Axis)
+        && let Some(at) = answer.axis.and_then(|p| placement.to_screen(p))
+    {
         cross(painter, at, 13.0, Stroke::new(4.0, Color32::from_black_alpha(140)));
         cross(painter, at, 12.0, Stroke::new(2.0, theme::AXIS));
         let outline: Vec<Pos2> = answer.ellipse.iter().filter_map(|p| placement.to_screen(*p)).collect();
@@ -142,7 +145,6 @@ fn body(viewer: &Viewer, painter: &Painter, answer: &BodyResult, placement: &Pla
             painter.add(Shape::closed_line(outline, Stroke::new(1.5, theme::AXIS)));
         }
     }
-    None
 }
 
 /// Draws lines with dashes, above a dark line that keeps them visible on clouds.
