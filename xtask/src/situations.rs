@@ -26,7 +26,7 @@ const fn shot(name: &'static str, open: &'static str, frame: &'static str, situa
     Shot { name, open: Some(open), frame, situation }
 }
 
-const SHOTS: [Shot; 16] = [
+const SHOTS: [Shot; 20] = [
     Shot { name: "welcome", open: None, frame: "0", situation: None },
     shot("ok", "rocket.mcap", "5", None),
     shot("refused", "discs", "1", Some("stages")),
@@ -43,6 +43,10 @@ const SHOTS: [Shot; 16] = [
     shot("rig", "ring/rig.toml", "0", None),
     shot("space", "rocket", "5", Some("space")),
     shot("sigmas", "rocket", "5", Some("sigmas")),
+    shot("ground", "rocket", "5", Some("ground")),
+    shot("two-values", "two-wrong", "5", Some("stages")),
+    shot("board", "rocket", "5", Some("board")),
+    shot("calibrated", "rocket", "5", Some("calibrated")),
 ];
 
 /// Makes all pictures in target/xtask/situations.
@@ -92,13 +96,13 @@ fn prepare(folder: &Path) -> Result<(), Trouble> {
     }
     if missing("wrong-focal") {
         copy(&folder.join("rocket"), &folder.join("wrong-focal"), |_| true)?;
-        let sensor = folder.join("wrong-focal/sensor.toml");
-        let text = fs::read_to_string(&sensor)?;
-        let wrong = |line: &str| match line.split_once(" = ") {
-            Some((key @ ("fx_px" | "fy_px"), _)) => format!("{key} = 1650.0\n"),
-            _ => format!("{line}\n"),
-        };
-        fs::write(&sensor, text.lines().map(wrong).collect::<String>())?;
+        make_focal_wrong(&folder.join("wrong-focal/sensor.toml"), 1.34)?;
+    }
+    if missing("two-wrong") {
+        copy(&folder.join("rocket"), &folder.join("two-wrong"), |_| true)?;
+        make_focal_wrong(&folder.join("two-wrong/sensor.toml"), 1.06)?;
+        let table = folder.join("two-wrong/frames.csv");
+        fs::write(&table, with_altitudes(&fs::read_to_string(&table)?, 30.0))?;
     }
     if missing("unmasked") {
         copy(&folder.join("rocket"), &folder.join("unmasked"), |_| true)?;
@@ -125,6 +129,35 @@ fn prepare(folder: &Path) -> Result<(), Trouble> {
     Ok(())
 }
 
+/// Makes the focal lengths in a sensor.toml longer by a factor.
+fn make_focal_wrong(sensor: &Path, factor: f64) -> Result<(), Trouble> {
+    let wrong = |line: &str| match line.split_once(" = ") {
+        Some((key @ ("fx_px" | "fy_px"), value)) => match value.parse::<f64>() {
+            Ok(px) => format!("{key} = {:.1}\n", factor * px),
+            Err(_) => format!("{line}\n"),
+        },
+        _ => format!("{line}\n"),
+    };
+    let text: String = fs::read_to_string(sensor)?.lines().map(wrong).collect();
+    Ok(fs::write(sensor, text)?)
+}
+
+/// Returns a frames.csv with file, time and altitude alone, all altitudes higher by some kilometres. With a position, a
+/// picture has a second source of its altitude.
+fn with_altitudes(table: &str, by_km: f64) -> String {
+    let mut rows = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let header = rows.next().unwrap_or_default();
+    let at = |name: &str| header.iter().position(|column| *column == name);
+    let mut out = "file,time_s,altitude_km\n".to_owned();
+    for row in rows {
+        let cell = |name: &str| at(name).and_then(|n| row.get(n).copied()).unwrap_or_default();
+        let altitude_km =
+            cell("altitude_km").parse::<f64>().map_or_else(|_| String::new(), |km| (km + by_km).to_string());
+        out += &format!("{},{},{altitude_km}\n", cell("file"), cell("time_s"));
+    }
+    out
+}
+
 /// Replaces a text in a file, or appends the new one if the file does not have the old one.
 fn change(file: &Path, old: &str, new: &str) -> Result<(), Trouble> {
     let text = fs::read_to_string(file)?;
@@ -143,4 +176,15 @@ fn copy(from: &Path, to: &Path, wants: impl Fn(&str) -> bool) -> Result<(), Trou
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_of_altitudes_has_no_positions() {
+        let table = "file,time_s,utc,altitude_km,x_km\na.jpg,1.5,,200.5,6000\n";
+        assert_eq!(with_altitudes(table, 30.0), "file,time_s,altitude_km\na.jpg,1.5,230.5\n");
+    }
 }

@@ -205,7 +205,8 @@ impl eframe::App for Window {
                 Err(anyhow!("no picture was shown within {} s: {}", SHOT_LIMIT.as_secs(), messages.join("; "))),
             );
         }
-        if !self.is_welcome && (!self.viewer.is_settled() || self.viewer.is_working()) {
+        let is_busy = self.viewer.is_working() || self.viewer.is_calibrating();
+        if !self.is_welcome && (!self.viewer.is_settled() || is_busy) {
             return;
         }
         if let Some(situation) = self.situation.take() {

@@ -9,6 +9,7 @@ use super::viewer::Viewer;
 use crate::model::navigation::{INNOVATIONS, NAV_QUANTITIES};
 use crate::model::settings::Layer;
 use crate::model::{FileChange, Session};
+use crate::work::calibration::Kind;
 
 /// A situation of the window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -37,6 +38,10 @@ pub enum Situation {
     Space,
     /// The sources of sigma, and errors over their sigmas, are plotted.
     Sigmas,
+    /// The form about the board whose pictures calibrate the lens is open.
+    Board,
+    /// The limb height and the noise of the edges were measured on the flight.
+    Calibrated,
 }
 
 impl Viewer {
@@ -74,6 +79,8 @@ impl Viewer {
                 self.settings.plotted = ["σ budget", "Error over σ (truth)"].map(str::to_owned).to_vec();
                 self.panels.open(Panel::Plots, &mut self.settings);
             }
+            Situation::Board => self.ask_board(),
+            Situation::Calibrated => self.calibrate(Kind::Noise),
             Situation::Changed => self.changes.of_file = Some(FileChange::Changed),
         }
     }
