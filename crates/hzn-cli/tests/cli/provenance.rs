@@ -30,8 +30,8 @@ fn a_recording_has_the_hash_of_its_sensor() {
     assert_ne!(hash(&place, "in/sensor.toml", "hash"), own);
 }
 
-/// The last line of the caption depends on the sensor; the picture and the lines above it do not, as long as the answer
-/// is the same.
+/// The last text of the caption, two lines in a small picture, depends on the sensor; the picture and the lines above it
+/// do not, as long as the answer is the same.
 #[test]
 fn an_overlay_names_its_sensor() {
     let place = Place::with_pictures(1);
@@ -48,7 +48,7 @@ fn an_overlay_names_its_sensor() {
         own.enumerate_pixels().zip(other.pixels()).filter(|((.., a), b)| a != b).map(|((_, y, _), _)| y).collect();
     let first = differs.iter().min().unwrap();
     assert!(*first > HEIGHT, "the picture and its answer are the same");
-    assert!(own.height() - first < 20, "only the last line differs: {first} of {}", own.height());
+    assert!(own.height() - first < 35, "only the last text differs: {first} of {}", own.height());
 }
 
 /// The commit of a package is the one that cargo wrote into it. The repository of another project, into which the
