@@ -235,8 +235,8 @@ fn answer_name(function: Function, answer: &str) -> String {
 
 /// Returns the acknowledgements that the verifiers wait for: a name, and the comparisons that choose the packet.
 ///
-/// A verifier that compares the parameters itself would also take an older acknowledgement, whose values a ground system
-/// keeps. A container is a packet that arrives.
+/// A verifier that compares the parameters itself would also take an older acknowledgement, whose values a ground
+/// system keeps. A container is a packet that arrives.
 pub(crate) fn answers() -> impl Iterator<Item = (String, String)> {
     let choose = |function: Function, operator: &str| {
         format!(

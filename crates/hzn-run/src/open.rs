@@ -381,7 +381,7 @@ pub fn check_altitude(source: &dyn Source, config: &Config, frames: Option<&Fram
         return check_above_limb(config);
     }
     let what = "no altitude: set altitude_km in [body] of sensor.toml, or write altitudes into a frames.csv; if it is \
-                not known, set altitude_limits_km = [LOWEST, HIGHEST] in [gates], and the limb is searched between them";
+                not known, set altitude_limits_km = [LOWEST, HIGHEST] in [gates]: the limb is searched between them";
     Err(unusable(what).with_remedy(Remedy::Altitude))
 }
 

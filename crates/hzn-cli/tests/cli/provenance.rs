@@ -30,8 +30,8 @@ fn a_recording_has_the_hash_of_its_sensor() {
     assert_ne!(hash(&place, "in/sensor.toml", "hash"), own);
 }
 
-/// The last text of the caption, two lines in a small picture, depends on the sensor; the picture and the lines above it
-/// do not, as long as the answer is the same.
+/// The last text of the caption, two lines in a small picture, depends on the sensor. The picture and the lines above
+/// it do not, as long as the answer is the same.
 #[test]
 fn an_overlay_names_its_sensor() {
     let place = Place::with_pictures(1);

@@ -112,7 +112,7 @@ fn without_altitude_and_limits_the_keys_are_named() {
         .run(&["run", "ring/rig.toml", "-o", "r.csv"])
         .expect(2)
         .says("head front: no altitude: set altitude_km in [body] of sensor.toml")
-        .says("set altitude_limits_km = [LOWEST, HIGHEST] in [gates], and the limb is searched between them");
+        .says("set altitude_limits_km = [LOWEST, HIGHEST] in [gates]: the limb is searched between them");
     // Below all limbs there is none.
     forget_altitude(&place, Some([5.0, 9.0]));
     place.run(&["run", "ring/rig.toml", "-o", "r.csv"]).expect(2).says("gates.altitude_limits_km: altitude");
