@@ -77,7 +77,8 @@ def without_limb(picture, random):
         angle, offset = random.uniform(0.0, math.tau), random.uniform(-200.0, 200.0)
         centre = [width / 2 + (radius + offset) * math.cos(angle), height / 2 + (radius + offset) * math.sin(angle)]
         distance = radius - np.hypot(x - centre[0], y - centre[1])
-        ground += random.uniform(-0.3, 0.5) * (high - low) / (1.0 + np.exp(-distance / random.uniform(0.7, 4.0)))
+        softness = np.clip(distance / random.uniform(0.7, 4.0), -50.0, 50.0)
+        ground += random.uniform(-0.3, 0.5) * (high - low) / (1.0 + np.exp(-softness))
     noise = random.normal(0.0, max(np.std(picture[picture < low + 0.1 * (high - low)]), 1.0), picture.shape)
     return np.clip(ground + noise, 0, np.iinfo(picture.dtype).max).astype(picture.dtype)
 

@@ -82,7 +82,7 @@ fn a_dead_camera_is_told_within_two_periods() {
         let mut parameters = Parameters::new(flight.sensor.clone());
         parameters.operations.boot_mode = 1;
         bench.write_copy_of(1, &parameters, 1);
-        let (printed, times_s) = run_with(&bench, "ping", 10_000);
+        let (printed, times_s) = run_with(&bench, "ping", 11_500);
         assert_heard(&times_s, &format!("{} after its camera died", board.name()));
         let exposures_s = column(&std::fs::read_to_string(bench.path("sent.csv")).unwrap(), "time_s");
         assert_eq!(exposures_s.len(), 20, "{printed}");
