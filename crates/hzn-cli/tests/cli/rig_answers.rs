@@ -121,7 +121,7 @@ fn without_altitude_and_limits_the_keys_are_named() {
     for head in ["front", "right", "back", "left"] {
         let file = format!("ring/{head}/sensor.toml");
         let sensor = place.read(&file);
-        place.write(&file, sensor[..sensor.find("[gates]").unwrap()].as_bytes());
+        place.write(&file, &sensor.as_bytes()[..sensor.find("[gates]").unwrap()]);
     }
     let table = place.read("ring/frames.csv");
     let with = |(i, line): (usize, &str)| format!("{line},{}\n", ["altitude_km", "500", "", "", ""][i]);
