@@ -1,4 +1,4 @@
-/* See hzn_app.h. The stack of the task needs 48 KiB; the sensor is in static memory. */
+/* See hzn_app.h. The stack of the task needs 56 KiB; the sensor is in static memory. */
 #include "hzn_app.h"
 
 #include <string.h>
