@@ -1,6 +1,6 @@
 //! Checks that drawings are readable on a dark system.
 
-/// Least contrast of lines, dots and letters with what is below them; 1 is none.
+/// Lines, dots and letters need at least this contrast to what is below them. Equal colours have the contrast 1.
 const LEAST: f64 = 3.0;
 /// Lines of a grid are fainter than this, and may be hard to see.
 const FAINT: f64 = 0.2;
@@ -86,8 +86,8 @@ fn contrast(a: [f64; 3], b: [f64; 3]) -> f64 {
     (a / b).max(b / a)
 }
 
-/// Checks that on a dark system the ground of every drawing is dark, and that each line, dot and letter stands out from
-/// what is below it. Returns the number of elements that were checked.
+/// Checks the drawings as a dark system shows them: the ground is dark, and each line, dot and letter stands out from
+/// what is below it. Returns the number of checked elements.
 pub(crate) fn assert_drawings_are_readable(text: &str) -> usize {
     let rules = dark_rules(text);
     let mut checked = 0;
