@@ -42,7 +42,9 @@ const STEPS: &[Step] = &[
         // The tests above build it without features. A feature chooses by `cfg!`, so most code is always compiled.
         ["std,_edges", "serde", "dlr,zju,horace,erf,kalibr,position,reml"].into_iter().try_for_each(check_core_with)?;
         // The crates of the page, without files and threads: the workspace builds them with all features.
-        steps::run(&mut cargo(&["check", "--quiet", "--package", "hzn-web"]))
+        steps::run(&mut cargo(&["check", "--quiet", "--package", "hzn-web"]))?;
+        // `cargo demo` leaves the solver out.
+        steps::run(&mut cargo(&["check", "--quiet", "--package", "hzn-fuse", "--no-default-features"]))
     }),
     every("documents", |_| steps::run(cargo(&["doc", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))),
     every("packages", |_| check_packages()),

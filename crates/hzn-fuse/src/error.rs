@@ -28,6 +28,13 @@ impl Error {
     pub(crate) fn unusable(message: impl std::fmt::Display) -> Self {
         Self::Unusable(message.to_string())
     }
+    /// This program cannot solve a whole flight.
+    pub(crate) fn without_solver() -> Self {
+        Self::unusable(
+            "this hzn was built without the feature `solve`, so that it compiles faster; `cargo install --locked --path \
+             crates/hzn-cli` builds the whole command",
+        )
+    }
     pub(crate) fn failed(message: impl std::fmt::Display) -> Self {
         Self::Failed(message.to_string())
     }

@@ -56,6 +56,9 @@ pub struct Wanted {
 /// An input is missing or contradicts another one, no two directions give a first attitude, or there are more
 /// measurements than a smoother can keep.
 pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fused, Error> {
+    if wanted.solved && !cfg!(feature = "solve") {
+        return Err(Error::without_solver());
+    }
     let mounts = mounts(&inputs.recordings)?;
     if inputs.imu.is_empty() {
         return without_unit(inputs, settings, &mounts, wanted);

@@ -1,12 +1,9 @@
-//! The factor A = L Lᵀ, by faer.
+//! The factor A = L Lᵀ.
 
-use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::linalg::cholesky::llt::factor::LltRegularization;
-use faer::sparse::linalg::cholesky::simplicial;
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par};
 use nalgebra::DVector;
 
+use super::Places;
+use super::cholesky::Lower;
 use super::normal::Normal;
 use super::pattern::Pattern;
 use crate::error::Error;
@@ -15,30 +12,24 @@ use crate::error::Error;
 #[derive(Debug)]
 pub struct Factor<'a> {
     pattern: &'a Pattern,
-    pub(super) symbolic: simplicial::SymbolicSimplicialCholesky<usize>,
+    lower: Lower,
     pub(super) values: Vec<f64>,
-    memory: usize,
 }
 
 impl<'a> Factor<'a> {
     /// Finds the places of the numbers of L.
     ///
     /// # Errors
-    /// The machine has too little memory.
+    /// The machine has too little memory, or hzn was built without the feature `solve`.
     pub fn new(pattern: &'a Pattern) -> Result<Self, Error> {
-        let (n, count) = (pattern.len(), pattern.row_indices.len());
-        let upper = SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_starts, None, &pattern.row_indices);
-        let mut memory = MemBuffer::new(StackReq::any_of(&[
-            simplicial::prefactorize_symbolic_cholesky_scratch::<usize>(n, count),
-            simplicial::factorize_simplicial_symbolic_cholesky_scratch::<usize>(n),
-        ]));
-        let (mut tree, mut counts) = (vec![0isize; n], vec![0usize; n]);
-        let stack = MemStack::new(&mut memory);
-        let tree = simplicial::prefactorize_symbolic_cholesky(&mut tree, &mut counts, upper, stack);
-        let symbolic = simplicial::factorize_simplicial_symbolic_cholesky(upper, tree, &counts, stack)
-            .map_err(|e| Error::failed(format!("the factor of the normal equations: {e:?}")))?;
-        let values = vec![0.0; symbolic.len_val()];
-        Ok(Self { pattern, symbolic, values, memory: n })
+        let lower = Lower::new(pattern.places())?;
+        let values = vec![0.0; lower.places().row_indices.len()];
+        Ok(Self { pattern, lower, values })
+    }
+
+    /// Returns the places of the numbers of L.
+    pub(super) fn places(&self) -> Places<'_> {
+        self.lower.places()
     }
 
     /// Returns the number of numbers in L.
@@ -54,19 +45,12 @@ impl<'a> Factor<'a> {
     /// Computes L of A + `damping` diag(A); `None` if the matrix is not positive definite.
     #[must_use]
     pub fn compute(&mut self, normal: &Normal<'_>, damping: f64) -> Option<()> {
-        let n = self.memory;
-        let mut values = normal.values.clone();
-        for end in self.pattern.column_starts.iter().skip(1) {
-            values[end - 1] *= 1.0 + damping;
+        let upper = self.pattern.places();
+        let mut numbers = normal.values.clone();
+        for end in upper.column_starts.iter().skip(1) {
+            numbers[end - 1] *= 1.0 + damping;
         }
-        let symbolic =
-            SymbolicSparseColMatRef::new_checked(n, n, &self.pattern.column_starts, None, &self.pattern.row_indices);
-        let matrix = SparseColMatRef::new(symbolic, &values);
-        let mut memory = MemBuffer::new(simplicial::factorize_simplicial_numeric_llt_scratch::<usize, f64>(n));
-        let no_change = LltRegularization::default();
-        let stack = MemStack::new(&mut memory);
-        simplicial::factorize_simplicial_numeric_llt(&mut self.values, matrix, no_change, &self.symbolic, stack)
-            .ok()?;
+        self.lower.compute(upper, &numbers, &mut self.values)?;
         self.values.iter().all(|x| x.is_finite()).then_some(())
     }
 
@@ -74,11 +58,7 @@ impl<'a> Factor<'a> {
     #[must_use]
     pub fn step(&self, normal: &Normal<'_>) -> DVector<f64> {
         let mut step: Vec<f64> = normal.gradient.iter().map(|g| -g).collect();
-        let llt = simplicial::SimplicialLltRef::<'_, usize, f64>::new(&self.symbolic, &self.values);
-        let n = step.len();
-        let columns = MatMut::from_column_major_slice_mut(&mut step, n, 1);
-        let mut memory = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(1));
-        llt.solve_in_place_with_conj(Conj::No, columns, Par::Seq, MemStack::new(&mut memory));
+        self.lower.solve(&self.values, &mut step);
         DVector::from_vec(step)
     }
 }

@@ -8,6 +8,7 @@
 
 use nalgebra::DMatrix;
 
+use super::Places;
 use super::factor::Factor;
 use super::pattern::Pattern;
 
@@ -23,7 +24,7 @@ pub struct Marginals<'a> {
 impl<'a> Marginals<'a> {
     /// Computes the covariance from the factor.
     pub fn new(pattern: &'a Pattern, factor: &Factor<'_>) -> Self {
-        let (starts, rows) = (factor.symbolic.col_ptr(), factor.symbolic.row_idx());
+        let Places { column_starts: starts, row_indices: rows } = factor.places();
         let mut values = vec![0.0; rows.len()];
         // For each row the share L_ij / L_jj of the column at hand, and the sum that becomes −Z_ij.
         let (mut share, mut sum) = (vec![0.0; pattern.len()], vec![0.0; pattern.len()]);

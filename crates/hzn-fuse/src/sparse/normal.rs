@@ -37,7 +37,7 @@ pub struct Normal<'a> {
 impl<'a> Normal<'a> {
     /// Makes the equations of no error.
     pub fn new(pattern: &'a Pattern) -> Self {
-        Self { pattern, values: vec![0.0; pattern.row_indices.len()], gradient: vec![0.0; pattern.len()] }
+        Self { pattern, values: vec![0.0; pattern.places().row_indices.len()], gradient: vec![0.0; pattern.len()] }
     }
 
     /// Adds an error. The pattern must join its blocks.
@@ -63,6 +63,6 @@ impl<'a> Normal<'a> {
 
     /// Returns the diagonal of A in the order of elimination.
     pub fn diagonal(&self) -> Vec<f64> {
-        self.pattern.column_starts.iter().skip(1).map(|end| self.values[end - 1]).collect()
+        self.pattern.places().column_starts.iter().skip(1).map(|end| self.values[end - 1]).collect()
     }
 }

@@ -2,10 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::sparse::SymbolicSparseColMatRef;
-use faer::sparse::linalg::amd;
-
+use super::{Places, cholesky};
 use crate::error::Error;
 
 /// The places of the numbers of a symmetric matrix of blocks: the upper triangle, in the order of elimination.
@@ -17,31 +14,25 @@ pub struct Pattern {
     /// For each block its partners that come before it and itself, by their starts, with the place of their first row
     /// in a column of this block.
     rows: Vec<Vec<(usize, usize)>>,
-    pub(super) column_starts: Vec<usize>,
-    pub(super) row_indices: Vec<usize>,
+    column_starts: Vec<usize>,
+    row_indices: Vec<usize>,
 }
 
-/// Returns the order of elimination of the blocks: approximate minimum degree.
-fn order(count: usize, partners: &[BTreeSet<usize>]) -> Result<Vec<usize>, Error> {
-    let mut column_starts = vec![0];
-    let mut row_indices: Vec<usize> = Vec::new();
+/// Returns the order of elimination of the blocks.
+fn order(partners: &[BTreeSet<usize>]) -> Result<Vec<usize>, Error> {
+    let (mut column_starts, mut row_indices) = (vec![0], Vec::new());
     for (block, others) in partners.iter().enumerate() {
         row_indices.extend(others.range(..=block));
         column_starts.push(row_indices.len());
     }
-    let (mut forward, mut backward) = (vec![0; count], vec![0; count]);
-    let mut memory = MemBuffer::new(amd::order_scratch::<usize>(count, row_indices.len()));
-    let matrix = SymbolicSparseColMatRef::new_checked(count, count, &column_starts, None, &row_indices);
-    amd::order(&mut forward, &mut backward, matrix, amd::Control::default(), MemStack::new(&mut memory))
-        .map_err(|e| Error::failed(format!("the order of the unknowns: {e:?}")))?;
-    Ok(forward)
+    cholesky::order(Places { column_starts: &column_starts, row_indices: &row_indices })
 }
 
 impl Pattern {
     /// Makes the pattern of blocks with these sizes. `joined` has the blocks of each error.
     ///
     /// # Errors
-    /// The machine has too little memory.
+    /// The machine has too little memory, or hzn was built without the feature `solve`.
     pub fn new<'a>(sizes: &[usize], joined: impl Iterator<Item = &'a [usize]>) -> Result<Self, Error> {
         let mut partners: Vec<BTreeSet<usize>> = (0..sizes.len()).map(|i| BTreeSet::from([i])).collect();
         for blocks in joined {
@@ -51,7 +42,7 @@ impl Pattern {
                 }
             }
         }
-        let order = order(sizes.len(), &partners)?;
+        let order = order(&partners)?;
         let mut starts = vec![0; sizes.len()];
         let mut next = 0;
         for &block in &order {
@@ -78,6 +69,11 @@ impl Pattern {
             }
         }
         Ok(Self { sizes: sizes.to_vec(), starts, rows, column_starts, row_indices })
+    }
+
+    /// Returns the places of the numbers of the upper triangle.
+    pub(super) fn places(&self) -> Places<'_> {
+        Places { column_starts: &self.column_starts, row_indices: &self.row_indices }
     }
 
     /// Returns the number of unknowns.
