@@ -1,4 +1,4 @@
-/* The numbers of the parameters of hzn, by their names in sensor.toml. Made by tests/header.rs; do not edit.
+/* The numbers of the parameters of hzn, by their names in sensor.toml. Made by tests/c/header.rs; do not edit.
    Of a parameter with several numbers, such as camera.k, this is the first. */
 #ifndef HZN_PARAMETERS_H
 #define HZN_PARAMETERS_H

@@ -1,4 +1,4 @@
-/* The verdicts on candidates. Made by tests/header.rs; do not edit. */
+/* The verdicts on candidates. Made by tests/c/header.rs; do not edit. */
 #ifndef HZN_VERDICTS_H
 #define HZN_VERDICTS_H
 

@@ -1,4 +1,4 @@
-//! The line for telemetry.
+//! The line for telemetry, whose memory also holds a telecommand while it is carried out.
 
 use super::clock::Clock;
 use crate::board::Board;

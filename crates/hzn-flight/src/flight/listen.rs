@@ -4,7 +4,7 @@
 //! line may own it, and because the line may return the packets of this computer.
 
 use super::Flight;
-use super::gate::Admitted;
+use super::admission::Admitted;
 use super::uplink::Uplink;
 use crate::board::Board;
 use crate::bytes::Reader;
@@ -14,7 +14,7 @@ use crate::packet::{Apid, MAX_BYTES};
 
 /// Most bytes that are read in a turn. More bytes wait in the memory of the serial port.
 // A line that never pauses would otherwise keep the loop from its pictures and its watchdog.
-pub(super) const MAX_READ: usize = 1024;
+pub(super) const MAX_TAKEN: usize = 1024;
 /// Most work of a turn, in examined bytes: two of the longest packets. Packets inside of packets could otherwise make a
 /// thousand times the work of their bytes.
 pub(super) const MAX_EFFORT: usize = 2 * MAX_BYTES;
@@ -48,7 +48,7 @@ impl<B: Board> Flight<'_, B> {
         let (mut bytes, mut is_done) = (0, false);
         loop {
             let (board, inbox) = (&mut self.board, &mut uplink.inbox);
-            let most = (MAX_READ - bytes).min(MAX_EFFORT.saturating_sub(inbox.effort()));
+            let most = (MAX_TAKEN - bytes).min(MAX_EFFORT.saturating_sub(inbox.effort()));
             if most == 0 {
                 break;
             }
@@ -90,7 +90,7 @@ impl<B: Board> Flight<'_, B> {
             Received::Foreign => self.state.foreign = self.state.foreign.saturating_add(1),
             Received::Command { sequence, bytes } => {
                 let user = self.buffers.line.out.get(..bytes).unwrap_or_default();
-                let admitted = uplink.gate.admit(&mut self.board, base, sequence, user);
+                let admitted = uplink.admission.admit(&mut self.board, base, sequence, user);
                 self.handle_admitted(sequence, admitted);
                 return Some(true);
             }

@@ -6,7 +6,7 @@
 //! | `recovery` | counts of resets, detection of lift-off |
 //! | `mode_changes` | the mode after a reset, at lift-off, at the end of the flight |
 //! | `listen` | the telecommand that arrives, and its acknowledgement |
-//! | `uplink`, `gate` | the line that it comes from, and whether its sender may command |
+//! | `uplink`, `admission` | the line that it comes from, and whether its sender may command |
 //! | `telecommands` | the functions of telecommands |
 //! | `parameter_commands` | the functions that read and change parameters |
 //! | `pictures` | the way of a picture to its science packet |
@@ -36,11 +36,11 @@ use crate::table;
 pub use crate::view::Lists;
 use crate::view::LongestEdge;
 
+mod admission;
 mod attitude;
 mod budget;
 mod camera_watch;
 mod clock;
-mod gate;
 mod housekeeping;
 mod known;
 mod line;

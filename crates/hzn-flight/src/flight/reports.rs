@@ -1,4 +1,4 @@
-//! Housekeeping and events, and the limits that keep a disturbed line from flooding itself.
+//! The flags of housekeeping, and the limits that keep a disturbed line from being flooded by events and answers.
 
 use crate::packet::OVERHEAD;
 

@@ -80,7 +80,7 @@ fn the_header_is_plain_c() {
 #[test]
 fn the_parameters_are_up_to_date() {
     let mut made =
-        "/* The numbers of the parameters of hzn, by their names in sensor.toml. Made by tests/header.rs; do \
+        "/* The numbers of the parameters of hzn, by their names in sensor.toml. Made by tests/c/header.rs; do \
                     not edit.\n   Of a parameter with several numbers, such as camera.k, this is the first. */\n\
                     #ifndef HZN_PARAMETERS_H\n#define HZN_PARAMETERS_H\n\n"
             .to_owned();
@@ -97,7 +97,7 @@ fn the_parameters_are_up_to_date() {
 /// `HZN_BLESS=1` writes the list anew.
 #[test]
 fn the_verdicts_are_up_to_date() {
-    let mut made = "/* The verdicts on candidates. Made by tests/header.rs; do not edit. */\n\
+    let mut made = "/* The verdicts on candidates. Made by tests/c/header.rs; do not edit. */\n\
                     #ifndef HZN_VERDICTS_H\n#define HZN_VERDICTS_H\n\n"
         .to_owned();
     for verdict in Verdict::ALL {

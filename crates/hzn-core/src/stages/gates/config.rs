@@ -144,8 +144,8 @@ section! {
         /// The default is for a camera that sees a limb in half of its pictures: the other gates let about one in fifty
         /// pictures without a limb pass. Set a smaller value if limbs are rarer, for example 5 for one picture in ten.
         @136 prior_odds: f64 = 50.0, [above 0.0 to 1e9];
-        /// Largest angle between the axis and the axis that a given attitude and position predict, in standard
-        /// deviations.
+        /// Largest angle between the axis and the axis that a given attitude and position predict, in combined standard
+        /// deviations of the answer and of that attitude.
         ///
         /// A smaller value refuses more false answers, and right answers whose attitude is worse than its sigma says.
         @130 max_attitude_sigma: f64 = 4.0, [above 0.0 to 1e6];

@@ -7,8 +7,8 @@ use super::{Rig, RigBoard};
 use crate::attitude::turned_back;
 use crate::board::Board;
 use crate::bytes::Reader;
+use crate::flight::admission::Admitted;
 use crate::flight::attitude::{TimedAttitude, read_attitude};
-use crate::flight::gate::Admitted;
 use crate::flight::navigation::{Values, read_navigation, read_prior};
 use crate::flight::{Flight, listen};
 use crate::messages::{Acknowledge, Code, Function, Housekeeping, Mode};
@@ -34,7 +34,7 @@ impl<B: RigBoard, const N: usize> Rig<'_, '_, B, N> {
         let (mut bytes, mut is_done) = (0, false);
         loop {
             let (board, inbox) = (&mut self.board, &mut self.buffers.uplink.inbox);
-            let most = (listen::MAX_READ - bytes).min(listen::MAX_EFFORT.saturating_sub(inbox.effort()));
+            let most = (listen::MAX_TAKEN - bytes).min(listen::MAX_EFFORT.saturating_sub(inbox.effort()));
             if most == 0 {
                 break;
             }
@@ -84,9 +84,9 @@ impl<B: RigBoard, const N: usize> Rig<'_, '_, B, N> {
             }
             Received::Command { base, sequence, bytes } => {
                 let user = line.out.get(..bytes).unwrap_or_default();
-                // One gate for all heads, so that one counter belongs to a key.
+                // One for all heads, so that one counter belongs to a key.
                 let admitted = match self.board.as_deref_mut() {
-                    Some(board) => uplink.gate.admit(board, base, sequence, user),
+                    Some(board) => uplink.admission.admit(board, base, sequence, user),
                     None => Admitted::Refused(Code::Closed),
                 };
                 if base == self.setup.base {

@@ -1,4 +1,4 @@
-//! The gate of a board with keys: which telecommands are carried out.
+//! Admission on a board with keys: which telecommands are carried out.
 
 use crate::authentication::{KEY_BYTES, KEYS, Key, RESERVED, TRAILER_BYTES};
 use crate::board::Board;
@@ -19,7 +19,7 @@ pub(super) enum Admitted {
 
 /// The counters of the last telecommands that were taken. All zeros mean that none was taken since the start.
 #[derive(Debug)]
-pub(super) struct Gate {
+pub(super) struct Admission {
     counters: [Counter; KEYS],
 }
 
@@ -31,7 +31,7 @@ struct Counter {
     inverse: u64,
 }
 
-impl Gate {
+impl Admission {
     pub(super) const fn new() -> Self {
         Self { counters: [Counter { last: 0, inverse: 0 }; KEYS] }
     }
