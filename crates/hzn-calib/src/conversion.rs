@@ -94,6 +94,20 @@ struct Sample {
 ///
 /// # Errors
 /// See [`Refusal`].
+///
+/// # Example
+///
+/// ```
+/// use hzn_calib::conversion::convert;
+/// use hzn_core::camera::{Config, Model};
+/// use hzn_files::camera_file::Loaded;
+///
+/// let mut lens = Config::ideal(Model::DoubleSphere, 1280, 960, 420.0);
+/// lens.k = [-0.18, 0.59].into_iter().collect();
+/// let fisheye = convert(&Loaded::Lens(lens), Model::KannalaBrandt)?;
+/// assert!(fisheye.max_px < 0.1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn convert(source: &Loaded, model: Model) -> Result<Conversion, Refusal> {
     convert_up_to(source, model, 180.0)
 }

@@ -123,6 +123,22 @@ pub fn load(path: &Path, size_px: [u16; 2]) -> Result<Table, Problem> {
 ///
 /// # Errors
 /// The errors are those of [`load`].
+///
+/// # Example
+///
+/// ```
+/// use hzn_calib::points::table;
+/// use std::path::Path;
+///
+/// let text = "u_px,v_px,azimuth_deg,elevation_deg\n959.5,539.5,0,0\n1759.5,539.5,45,0\n";
+/// let table = table::parse(text, Path::new("points.csv"), [1920, 1080])?;
+/// let right = table.pictures[0].points[1];
+/// assert!((right.direction[0] - 0.5_f64.sqrt()).abs() < 1e-12);
+///
+/// let wrong = table::parse(&text.replace("1759.5", "2759.5"), Path::new("points.csv"), [1920, 1080]);
+/// assert!(wrong.unwrap_err().to_string().contains("u_px"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn parse(text: &str, path: &Path, size_px: [u16; 2]) -> Result<Table, Problem> {
     let mut reader =
         ReaderBuilder::new().trim(Trim::All).comment(Some(b'#')).from_reader(UnixLines::new(text.as_bytes()));
