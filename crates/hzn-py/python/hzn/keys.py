@@ -316,8 +316,8 @@ class Gates(TypedDict, total=False):
     """Odds that an edge that passes all other gates is the limb, before its evidence is weighed. Values: above 0 to
     1e9. Default: 50.0."""
     max_attitude_sigma: float
-    """Largest angle between the axis and the axis that a given attitude and position predict, in standard
-    deviations. Values: above 0 to 1e6. Default: 4.0."""
+    """Largest angle between the axis and the axis that a given attitude and position predict, in combined standard
+    deviations of the answer and of that attitude. Values: above 0 to 1e6. Default: 4.0."""
     max_rate_deg_s: float | None
     """Largest rate of rotation of the vehicle, degrees per second; an axis that is farther from the previous answer
     is refused. Values: above 0 to 1e6 deg/s. Default: any."""
