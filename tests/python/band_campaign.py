@@ -99,13 +99,13 @@ def fly(program, folder, seed, table, any_filter, frames, sharp, weather_km):
 
 
 def error(row, true):
-    """Returns the error in degrees, and the square of the normalised error over its two degrees of freedom."""
+    """Returns the error in degrees, and the square of the normalised error, whose mean is 2 if the covariance is right."""
     axis, of_truth = (np.array([float(r[f"axis_{x}"]) for x in "xyz"]) for r in (row, true))
     c = {k: float(row[f"cov_{k}"]) for k in ("xx", "xy", "xz", "yy", "yz", "zz")}
     covariance = np.array([[c["xx"], c["xy"], c["xz"]], [c["xy"], c["yy"], c["yz"]], [c["xz"], c["yz"], c["zz"]]])
     d = of_truth - axis
     d -= axis * (axis @ d)
-    return np.degrees(np.linalg.norm(d)), d @ np.linalg.pinv(covariance, rcond=1e-9) @ d / 2
+    return np.degrees(np.linalg.norm(d)), d @ np.linalg.pinv(covariance, rcond=1e-9) @ d
 
 
 def main():
@@ -135,7 +135,7 @@ def main():
                 all_found[told] += errors
     for told, errors in all_found.items():
         e, n = np.array(errors).T
-        rms, beyond = np.sqrt(np.mean(e**2)), 100 * np.mean(n * 2 > 11.829)
+        rms, beyond = np.sqrt(np.mean(e**2)), 100 * np.mean(n > 11.829)
         print(f"{told}: {len(e)} of {pictures} answered, {rms:.4f} deg RMS, NEES {n.mean():.2f}, ", end="")
         print(f"{beyond:.1f} % beyond 3 sigma")
 

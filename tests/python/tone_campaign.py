@@ -4,7 +4,7 @@
 
 Scenes of the simulator (`hzn simulate`, all cameras of a scene) and pictures by day of another program (limb_pictures.py).
 The sensor has the lens, the mask and the position; the limb height, its sigma and the noise are the defaults. Each line
-has its own answers, and the ratio is over the pictures that both answer.
+has its own answers, and the ratio is over the pictures that both answer. The NEES is 2 if the covariance is right.
 """
 
 import argparse
@@ -81,7 +81,7 @@ def show(scenes, flown):
         for column, told in enumerate(("unknown", "told")):
             errors, squares = np.array([row[column] for row in rows if row[column]]).reshape(-1, 2).T
             cells = [scene, told, f"{len(rows)}", f"{len(errors)}", f"{math.sqrt((errors**2).mean()):.3f}°",
-                     f"{squares.mean() / 2:.2f}", f"{100 * (squares > limb_campaign.BEYOND_3).mean():.1f} %",
+                     f"{squares.mean():.2f}", f"{100 * (squares > limb_campaign.BEYOND_3).mean():.1f} %",
                      f"{ratio:.2f}" if column else ""]
             print(f"| {' | '.join(cells)} |")
 
