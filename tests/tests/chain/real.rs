@@ -4,6 +4,7 @@
 
 use hzn_core::Prior;
 use hzn_core::body::Night;
+use hzn_core::real::Real;
 use hzn_core::status::Status;
 use hzn_core::tone::Tone;
 use hzn_host::Compiled;
@@ -193,6 +194,38 @@ fn airglow_is_no_limb() {
     let believed = process(&mut Sensors::new(&night.sensor).host, night.view(), &Prior::default());
     let error_deg = believed.expect("the airglow passes the other gates").error_deg(NIGHT_AXIS);
     assert!(error_deg > 2.0, "{error_deg}°");
+}
+
+/// Direction to the Earth in iss029e8492-night.jpg, from its stars.
+const AURORA_AXIS: [f64; 3] = [-0.076380, 0.974049, 0.213062];
+
+/// Returns what is known of that photograph: nothing, or its height and that it is night.
+fn known<T: Real>(is_night: bool) -> Prior<T> {
+    let known = is_night.then(|| ([6_770_200.0, 0.0, 0.0].map(T::from_f64), T::from_f64(-1.2)));
+    Prior { position_m: known.map(|k| k.0), sun_elevation_rad: known.map(|k| k.1), ..Prior::default() }
+}
+
+#[test]
+fn aurora_about_the_airglow_is_not_answered_wrong() {
+    let airglow = |tone| (Night::Airglow, tone);
+    let cases = [(Night::Refuse, Tone::Unknown), airglow(Tone::Unknown), airglow(Tone::Srgb)];
+    for (file, (night, tone)) in ["full/iss029e8492-night.jpg", "iss029e8492-night.jpg"]
+        .into_iter()
+        .flat_map(|file| cases.map(|case| (file, case)))
+    {
+        let mut p = Photograph::load(file);
+        p.sensor.body.night = night;
+        p.sensor.set_tone(tone);
+        let is_night = night == Night::Airglow;
+        let mut sensors = Sensors::new(&p.sensor);
+        let host = process(&mut sensors.host, p.view(), &known(is_night));
+        let flight = process(&mut sensors.flight, p.view(), &known(is_night));
+        for (kind, answer) in [("host", host), ("flight", flight)] {
+            let error = answer.as_ref().map(|a| (a.error_deg(AURORA_AXIS), a.sigma_deg()));
+            println!("{file} {kind} {night:?} {tone}: {error:.3?}");
+            assert!(error.is_err() || error.is_ok_and(|(error, sigma)| error <= 3.0 * sigma), "{file} {kind}");
+        }
+    }
 }
 
 /// Both photographs show aurora above the airglow, so the outermost edge is not that of the layer. They
