@@ -56,7 +56,9 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         Verdict::Departure => "the edge leaves the fitted limb smoothly (gates.max_departure)".into(),
         Verdict::Band => "behind the edge there is a narrow band, and then the sky again (gates.max_band)".into(),
         Verdict::Night => "it is night at this time and position (gates.max_unlit, body.sunlit)".into(),
-        Verdict::Layer => "at night, the light below the edge does not become less: it is no layer of airglow".into(),
+        Verdict::Layer => {
+            "at night, the light below the edge does not become less, or none is left: it is no layer of airglow".into()
+        }
         Verdict::Faint => "the brightness hardly changes across the edge, as in twilight".into(),
         Verdict::Unlikely => format!("its probability to be the limb is below {} (gates.min_p_limb)", s.min_p_limb),
         Verdict::Glow => GLOW.into(),

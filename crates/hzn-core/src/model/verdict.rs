@@ -90,6 +90,6 @@ verdicts! {
     /// or the vehicle. Or the picture is an earlier one to the last bit.
     Fixed = 27, "fixed";
     /// It is night, `body.night` asks for the airglow, and the edge is not the outer edge of its layer: below it the
-    /// light does not become less.
+    /// light does not become less, or less of it is left than a layer leaves.
     Layer = 28, "layer";
 }

@@ -3,7 +3,8 @@
 //!
 //! A line of cities along a coast has one. But nothing stands above the layer, so that its light is seen along the
 //! whole limb, and a line of sight runs through 700 km of it, so that its light changes little along a picture. A line
-//! of cities ends, has gaps, or has lights of every brightness.
+//! of cities ends, has gaps, or has lights of every brightness. And the layer is seen below its edge, too: every line
+//! of sight crosses it. Behind a line of cities the ground is as dark as before it.
 //!
 //! The gate `glow` asks for no light beyond the edge. Where the picture ends next to the edge, the layer may be outside
 //! of it, and the edge that of the ground; so the sky beyond the edge must be in view.
@@ -55,6 +56,15 @@ const LEAST_DEPTH: f64 = 0.5;
 /// Number of steps above the edge at which sky must be in view: the layer is at most 128 km above the ground, and its
 /// light is gone 60 km above its edge, where the gate `glow` looks.
 const SKY_STEPS: f64 = 6.0;
+/// Smallest light at the first place below the edge, as a part of the largest light; it falls with the square root of
+/// the depth.
+// A line of sight that passes D below a thin layer crosses it twice, each time over √(R/2D) of its thickness. The
+// thinnest layer, with a full width of 3 km at half of its emission, leaves 0.353 at 10 km. Thicker layers, sRGB,
+// overexposure and blur leave more.
+const BELOW: f64 = 0.35;
+/// Last place down to which the layer is seen twice. Below it the far side may be behind dense air or the ground.
+// At 60 km below the lowest edge the line of sight stays 26 km above the ground, where the air is clear.
+const LAST_TWICE: i32 = 6;
 /// Fewest places along the edge that must show a depth.
 const LEAST: usize = 3;
 
@@ -74,7 +84,7 @@ pub(super) fn refuse<T: Real, P: Pixels, O: Observer<T>>(
     let is_layer = !P::STREAMED
         && places.iter().filter(is_sky_shown).count() >= LEAST
         && profile(case, binary, places)
-            .is_some_and(|light| has_trough(&light, sky) && is_everywhere(&light, case, binary, places, sky));
+            .is_some_and(|light| is_a_layers(&light, sky) && is_everywhere(&light, case, binary, places, sky));
     refuse_if(!is_layer, Verdict::Layer)
 }
 
@@ -171,6 +181,20 @@ fn is_even<T: Real, P: Pixels, O: Observer<T>>(
     T::from_i32(even as i32) >= T::from_i32(lights.len() as i32) * T::from_f64(MOST_EVEN)
 }
 
+/// Returns whether the light below the edge may be that of a layer.
+fn is_a_layers<T: Real>(profile: &Profile<T>, sky: &Sky<T>) -> bool {
+    has_trough(profile, sky) && is_left_below(profile, sky)
+}
+
+/// Returns whether as much light is left below the edge as the thinnest layer leaves.
+fn is_left_below<T: Real>(profile: &Profile<T>, sky: &Sky<T>) -> bool {
+    let most = profile.iter().take(BRIGHTEST).fold(T::ZERO, |most, &light| most.max(light - sky.median));
+    // A mean of nine pixels loses up to one count.
+    let noise = sky.spread * T::from_f64(LEAST_DEPTH) + T::one();
+    let seen = |k: i32| T::from_f64(if k > LAST_TWICE { 0.5 * BELOW } else { BELOW });
+    (1..).zip(profile).all(|(k, &light)| light - sky.median + noise >= most * seen(k) / T::from_i32(k).sqrt())
+}
+
 /// Returns whether the light becomes less below the edge, and does not rise again too early.
 fn has_trough<T: Real>(profile: &Profile<T>, sky: &Sky<T>) -> bool {
     let (mut most, mut least, mut is_in_trough) = (T::ZERO, T::ZERO, false);
@@ -202,7 +226,7 @@ mod tests {
 
     fn is_layer(profile: &[f64]) -> bool {
         let sky = Sky { lit: 0.0, median: 10.0, spread: 1.0 };
-        has_trough(&profile.iter().map(|light| light + 10.0).collect(), &sky)
+        is_a_layers(&profile.iter().map(|light| light + 10.0).collect(), &sky)
     }
 
     #[test]
@@ -220,5 +244,31 @@ mod tests {
         assert!(!is_layer(&[100.0, 20.0, 20.0, 90.0, 100.0, 100.0]));
         assert!(!is_layer(&[0.4, 0.0, 0.0, 0.0]));
         assert!(!is_layer(&[]));
+    }
+
+    /// Returns the light of a Chapman layer at these depths below its edge, where half of its light is left, km.
+    fn light_below(thick_km: f64, depths_km: impl Iterator<Item = f64>) -> Profile<f64> {
+        let light = |above_peak_km: f64| -> f64 {
+            (0..8000).fold(0.0, |sum, i| {
+                let height_km = (6461.0 + above_peak_km).hypot((f64::from(i) + 0.5) * 0.25) - 6461.0;
+                let z = height_km / thick_km;
+                sum + (1.0 - z - (-z).exp()).exp()
+            })
+        };
+        let at = |i: i32| f64::from(i) * 0.05 * thick_km;
+        let most = (-40..20).map(|i| light(at(i))).fold(0.0, f64::max);
+        let edge = at((0..200).find(|&i| light(at(i)) < 0.5 * most).unwrap());
+        depths_km.map(|depth| 100.0 * light(edge - depth) / most).collect()
+    }
+
+    #[test]
+    fn a_layer_is_seen_below_its_edge() {
+        for thick_km in [3.0 / 2.446, 3.0, 7.5, 12.0] {
+            let profile = light_below(thick_km, (1..=8).map(|k| f64::from(k) * STEP_M * 1e-3));
+            assert!(is_layer(&profile), "{thick_km} km: {profile:.1?}");
+        }
+        // Lines of cities, narrow and wide, behind which the ground is as dark as before them.
+        assert!(!is_layer(&[100.0, 60.0, 20.0, 5.0, 2.0, 2.0, 2.0, 2.0]));
+        assert!(!is_layer(&[90.0, 100.0, 95.0, 90.0, 80.0, 50.0, 20.0, 3.0, 0.0, 0.0]));
     }
 }
