@@ -18,3 +18,13 @@ mod stages;
 mod total;
 mod track;
 mod uncertain_lens;
+#[cfg(all(
+    feature = "dlr",
+    feature = "erf",
+    feature = "horace",
+    feature = "kalibr",
+    feature = "position",
+    feature = "reml",
+    feature = "zju"
+))]
+mod varied;
