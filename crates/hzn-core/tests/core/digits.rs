@@ -367,3 +367,27 @@ fn of_every_method() {
     }
     table.check();
 }
+
+/// The axis of a fit with a known half-angle moves with it, as its derivative says.
+#[test]
+fn a_known_half_angle_moves_the_axis() {
+    let data = earth(|km, _| 5.0 + 150.0 * limb(km));
+    let at = |limb_height_km: f64, half_angle: fit::HalfAngle| {
+        let mut config = earth_sensor();
+        config.body.limb_height_km = limb_height_km;
+        config.fit.half_angle = half_angle;
+        let mut horizon = HostHorizon::boxed(&config).unwrap();
+        let expected = horizon.expect(&Prior::default()).unwrap();
+        let picture = Grey::try_new(&data, Layout::packed(SIZE[0].into(), SIZE[1].into(), 1, 8)).unwrap();
+        (expected.cos_and_sigma().0, horizon.process(&picture, &expected).solution.unwrap())
+    };
+    for (half_angle, tolerance) in [(fit::HalfAngle::Known, 0.01), (fit::HalfAngle::Fused, 0.05)] {
+        let (low, high) = (at(16.5, half_angle), at(17.5, half_angle));
+        let by_cos = low.1.axis_by_cos.unwrap();
+        let (before, after) = (low.1.axis.xyz(), high.1.axis.xyz());
+        let moved = [0, 1, 2].map(|k| (after[k] - before[k]) / (high.0 - low.0));
+        let off = [0, 1, 2].map(|k| moved[k] - by_cos[k]);
+        let size = dot(by_cos, by_cos).sqrt();
+        assert!(size > 0.5 && dot(off, off).sqrt() < tolerance * size, "{half_angle:?}: {moved:?} {by_cos:?}");
+    }
+}

@@ -146,4 +146,43 @@ mod tests {
         assert!((2.0..5.0).contains(&found), "{found}");
         assert!(rms::<f32>(&shape((0..2).map(at))).is_none());
     }
+    /// Waves of three periods about a circle are not absorbed by any circle: their RMS is that of the waves. Waves of
+    /// one period are another centre, and a constant is another radius.
+    #[test]
+    fn waves_about_a_circle_are_its_residuals() {
+        let waves = |turn: f64, waves_px: [f64; 4]| {
+            let at = |i: usize| {
+                let angle = turn * i as f64 / MOST as f64 + 0.4;
+                let off = (0..4).map(|k| waves_px[k] * libm::cos(k as f64 * angle)).sum::<f64>();
+                let (s, c) = libm::sincos(angle);
+                [700.0 + (250.0 + off) * c, 300.0 + (250.0 + off) * s]
+            };
+            rms::<f64>(&shape((0..MOST).map(at))).unwrap()
+        };
+        let whole = core::f64::consts::TAU;
+        assert!((waves(whole, [0.0, 0.0, 0.0, 0.5]) - 0.5 * core::f64::consts::FRAC_1_SQRT_2).abs() < 1e-3);
+        assert!((waves(whole, [3.0, 2.0, 0.0, 0.5]) - 0.5 * core::f64::consts::FRAC_1_SQRT_2).abs() < 0.02);
+        // The digits of the best circle of an arc, after two steps from one through three of its points.
+        for (turn, want) in [(whole, 2.063_064_334_975_713), (2.0, 0.892_740_617_053_6), (0.9, 0.055_206_010_823_270_5)]
+        {
+            let found = waves(turn, [1.0, 2.0, -1.5, 2.5]);
+            assert!((found / want - 1.0).abs() < 1e-11, "{turn}: {found}");
+        }
+    }
+
+    #[test]
+    fn the_weights_of_the_points_count() {
+        let at = |i: usize| {
+            let (s, c) = libm::sincos(i as f64 / 30.0);
+            [100.0 * c, 100.0 * s + if i % 8 == 3 { 6.0 } else { 0.0 }]
+        };
+        let mut points = shape::<f64>((0..MOST).map(at));
+        let all = rms(&points).unwrap();
+        points.iter_mut().filter(|p| p.number == 0).enumerate().for_each(|(i, p)| {
+            if i % 8 == 3 {
+                p.w = 0.0;
+            }
+        });
+        assert!(all > 1.0 && rms(&points).unwrap() < 1e-9);
+    }
 }

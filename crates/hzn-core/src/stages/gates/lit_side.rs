@@ -200,3 +200,102 @@ fn brightness<T: Real, P: Pixels, O: Observer<T>>(
     let is_seen = binary.region.contains(x, y) && !binary.masked(x, y);
     is_seen.then(|| binary.brightness(x, y))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NONE: Light<f64> =
+        Light { night: 0, bright: 0, pairs: 0, brightness: 0.0, predicted2: 0.0, along: 0.0, across: 0.0, seen2: 0.0 };
+
+    /// Returns the azimuths of the places of a ring from that of the Sun.
+    fn turn(place: usize) -> f64 {
+        (place as f64 + 0.5) * core::f64::consts::TAU / PLACES as f64
+    }
+
+    #[test]
+    fn places_are_evenly_around_the_ring() {
+        for place in 0..PLACES {
+            let (sin, cos) = libm::sincos(turn(place));
+            let [x, y] = azimuth(place);
+            assert!((x - cos).abs() < 1e-15 && (y - sin).abs() < 1e-15, "{place}");
+        }
+    }
+
+    /// A ring lit from an angle off the told Sun, and one that the told Sun lights.
+    fn ring(off: f64, contrast: f64) -> Light<f64> {
+        let light = |place: usize, off: f64| 1.0 + contrast * libm::cos(turn(place) - off);
+        let predicted: [f64; PLACES] = core::array::from_fn(|place| light(place, 0.0));
+        let seen: [Option<f64>; PLACES] = core::array::from_fn(|place| Some(100.0 * light(place, off)));
+        let mut sums = NONE;
+        sums.add_pairs(&seen, &predicted);
+        sums
+    }
+
+    /// The differences of mirror images are 2 k cos φ. Over the eight pairs of a half ring, Σ cos² φ is 4.
+    #[test]
+    fn sums_are_those_of_mirror_images() {
+        for off in [0.0, 0.3, -1.2, 2.0, 3.1] {
+            let sums = ring(off, 0.9);
+            let near = |found: f64, want: f64| assert!((found - want).abs() < 1e-9, "{off}: {found} {want}");
+            assert_eq!(sums.pairs, 8);
+            near(sums.brightness, 16.0);
+            near(sums.predicted2, 16.0 * 0.81);
+            near(sums.along, 1600.0 * 0.81 * libm::cos(off));
+            near(sums.across, 1600.0 * 0.81 * libm::sin(off));
+            near(sums.seen2, 160_000.0 * 0.81);
+        }
+    }
+
+    #[test]
+    fn light_from_more_than_a_right_angle_half_aside_contradicts() {
+        let aside = |deg: f64| ring(deg.to_radians(), 0.9).contradicts();
+        for deg in [0.0, 20.0, 44.0, -44.0] {
+            assert!(!aside(deg), "{deg}");
+        }
+        for deg in [46.0, -46.0, 90.0, 120.0, 180.0, -100.0] {
+            assert!(aside(deg), "{deg}");
+        }
+        // A ring that is lit evenly says nothing: its contrast is the RMS of 2 k cos φ over the mean brightness.
+        let least = 0.2 * core::f64::consts::SQRT_2;
+        let even = |contrast: f64| ring(2.0, contrast).contradicts();
+        assert!(!even(least * 0.99) && even(least * 1.01));
+    }
+
+    /// Of places that are not seen, the pairs do not count: each place is in two pairs, and in two of the other Sun.
+    #[test]
+    fn pairs_with_a_hidden_place_are_left_out() {
+        for hidden in 0..PLACES {
+            let mut seen = [Some(1.0); PLACES];
+            seen[hidden] = None;
+            let mut sums = NONE;
+            sums.add_pairs(&seen, &[0.5; PLACES]);
+            assert_eq!((sums.pairs, sums.brightness), (6, 6.0), "{hidden}");
+        }
+    }
+
+    /// The noise of the residuals counts: three sigmas, each twice that of independent places.
+    #[test]
+    fn noise_makes_a_contradiction_uncertain() {
+        // a = 0 and b = 1, and residuals with the sum of squares r: σ² = r/(2 n t²) with n t² = 8 · 16.
+        let with = |residuals: f64| Light {
+            pairs: 8,
+            brightness: 16.0,
+            predicted2: 16.0,
+            along: 0.0,
+            across: 16.0,
+            seen2: 16.0 + residuals,
+            ..NONE
+        };
+        let most = 256.0 / 36.0;
+        assert!(with(most * 0.99).contradicts() && !with(most * 1.01).contradicts());
+        // Fewer than eight pairs are no evidence.
+        assert!(!Light { pairs: 7, ..with(0.0) }.contradicts());
+    }
+
+    #[test]
+    fn most_places_of_the_night_must_be_dark() {
+        let night = |night: i32, bright: i32| Light { night, bright, ..NONE }.contradicts();
+        assert!(night(8, 5) && !night(8, 4) && !night(7, 7) && night(20, 11) && !night(20, 10));
+    }
+}

@@ -34,3 +34,35 @@ fn in_view<T: Real>(e: &V3<T>, c: T, camera: &Camera<T>, region: &Region<T>) -> 
         inside && u16::try_from(x).is_ok_and(|x| u16::try_from(y).is_ok_and(|y| region.contains(x, y)))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::camera::{self, Model};
+
+    /// A limb counts if it passes the middle of a pixel by at most half of one, on each side of the picture.
+    #[test]
+    fn a_limb_is_in_view_up_to_half_a_pixel_beyond_the_border() {
+        let camera = Camera::<f64>::try_new(&camera::Config::ideal(Model::Pinhole, 64, 48, 50.0)).unwrap();
+        let region = Region::whole(64, 48);
+        let alpha = 0.03;
+        // The point of the limb that is nearest to the picture has this coordinate on one axis.
+        let at = |axis: usize, px: f64, side: f64| {
+            let centre = [31.5, 23.5][axis];
+            let off = libm::atan((px - centre) / 50.0) + side * alpha;
+            let (s, c) = libm::sincos(off);
+            let e = if axis == 0 { V3::new(s, 0.0, c) } else { V3::new(0.0, s, c) };
+            in_view(&e, libm::cos(alpha), &camera, &region)
+        };
+        for axis in [0, 1] {
+            assert!(at(axis, -0.4, -1.0) && !at(axis, -0.6, -1.0), "{axis}");
+            let last = [63.0, 47.0][axis];
+            assert!(at(axis, last + 0.4, 1.0) && !at(axis, last + 0.6, 1.0), "{axis}");
+        }
+        // The picture lies within a limb that is wide, and next to one that is behind the camera.
+        let wide = |z: f64| in_view(&V3::new(0.0, 0.0, z), libm::cos(1.2), &camera, &region);
+        assert!(!wide(1.0) && !wide(-1.0));
+        let skew = V3::new(libm::sin(1.2), 0.0, libm::cos(1.2));
+        assert!(in_view(&skew, libm::cos(1.2), &camera, &region));
+    }
+}

@@ -1,6 +1,7 @@
 //! Thresholds of drawn pictures.
 
 use super::histogram::{BINS, Histogram};
+use super::small_body::split_small_body;
 use super::*;
 use crate::base::rng::Rng;
 use crate::image::{Grey, Layout};
@@ -147,4 +148,50 @@ fn a_small_body_is_found_by_the_finer_sample() {
     assert!((90..=110).contains(&found.level), "{}", found.level);
     let lower = level(&data, 8, Brightness::default(), Config { scale: 0.5, ..Config::default() }).unwrap();
     assert!((45..=55).contains(&lower.level), "{}", lower.level);
+}
+
+/// Collects the pixels that are read.
+#[derive(Default)]
+struct Reads(core::cell::RefCell<Vec<(u16, u16)>>);
+impl crate::model::observer::Observer<f64> for Reads {
+    fn pixel(&self, x: u16, y: u16) {
+        self.0.borrow_mut().push((x, y));
+    }
+}
+
+/// The third sample of a disc of 4 px, with a hot pixel beside it: the grid, then the window about the brightest place.
+#[test]
+fn a_body_between_the_places_of_both_samples_has_a_window_of_its_own() {
+    let (width, height) = (640u16, 480u16);
+    let data: Vec<u8> = (0..480i32 * 640)
+        .map(|i| match ((i % 640 - 301).pow(2) + (i / 640 - 203).pow(2) <= 16, i == 10 * 640 + 10) {
+            (_, true) => 255,
+            (true, _) => 200,
+            _ => 20,
+        })
+        .collect();
+    let picture = Grey::try_new(&data[..], Layout::packed(640, 480, 1, 8)).unwrap();
+    let find = |scale: f64, radius_px: f64| {
+        let (reads, region) = (Reads::default(), Region::whole(width, height));
+        let config = Config { scale, ..Config::default() };
+        let (places, level) = split_small_body(&picture, &region, &config, radius_px, &reads);
+        (places, level, reads.0.into_inner())
+    };
+    let (places, level, reads) = find(1.0, 4.0);
+    let level = level.unwrap();
+    assert_eq!(places, 160 * 120);
+    assert_eq!((reads[0], reads[1], reads[160]), ((2, 2), (6, 2), (2, 6)));
+    // The window reaches two radii to each side of a place on the disc, and has all of its 17 rows and columns.
+    let window = &reads[19_200..];
+    assert_eq!((window.len(), level.samples), (17 * 17, 19_200 + 17 * 17));
+    let (first, last) = (window[0], window[17 * 17 - 1]);
+    assert_eq!((last.0 - first.0, last.1 - first.1), (16, 16));
+    assert!((first.0 + 8).abs_diff(301) <= 4 && (first.1 + 8).abs_diff(203) <= 4);
+    assert_eq!(level.level, 110);
+    assert_eq!(find(0.5, 4.0).1.unwrap().level, 55);
+    // The first places lie half of the spacing inside; a large body is none for this sample.
+    assert_eq!(find(1.0, 6.9).2[0], (3, 3));
+    assert_eq!((find(1.0, 7.0).0, find(1.0, 7.0).2.len()), (0, 0));
+    // A radius below a pixel has as many places as the limit allows: every second pixel or so.
+    assert!((65_000..=77_000).contains(&find(1.0, 0.1).0), "{}", find(1.0, 0.1).0);
 }

@@ -2,7 +2,7 @@
 
 use hzn_core::body::{self, Kind};
 use hzn_core::frames::{Rotation, UnitVec3};
-use hzn_core::{Config, FlightHorizon, HostHorizon, fit};
+use hzn_core::{Config, FlightHorizon, HostHorizon, Prior, fit};
 
 use super::options::{self, Told};
 use super::{Canvas, Dice, Table, V3, cross, direction, dot, grey, sum, unit};
@@ -33,6 +33,20 @@ impl Body {
     }
 }
 
+/// How a body is seen.
+#[derive(Clone, Copy)]
+struct View {
+    half_angles: &'static [f64],
+    /// Whether the picture shows a part of the limb.
+    is_arc: bool,
+    hides_orientation: bool,
+}
+
+/// Whole discs, parts of a limb, and whole discs of which nothing is told.
+const WHOLE: View = View { half_angles: &[0.012, 0.03, 0.06, 0.12], is_arc: false, hides_orientation: false };
+const PART: View = View { half_angles: &[0.2, 0.4, 0.9, 1.2], is_arc: true, ..WHOLE };
+const UNTOLD: View = View { half_angles: &[0.05, 0.1, 0.14], hides_orientation: true, ..WHOLE };
+
 /// A disc before a camera.
 struct Scene {
     config: Config,
@@ -41,7 +55,7 @@ struct Scene {
 }
 
 impl Scene {
-    fn draw(dice: &mut Dice, kind: Kind, radii: [f64; 3], others: u32) -> Self {
+    fn draw(dice: &mut Dice, kind: Kind, radii: [f64; 3], view: View) -> Self {
         let size = dice.pick(&[[240, 180], [180, 240]]);
         let mut config = Config::new(options::lens(dice, size, 0.35));
         config.body = body::Config {
@@ -50,10 +64,12 @@ impl Scene {
         };
         config.body.radius_km = (kind == Kind::Sphere).then_some(radii[0]);
         (config.body.limb_height_km, config.body.limb_height_sigma_km) = (0.0, radii[0] * dice.pick(&[1e-4, 3e-3]));
-        let half_angle = dice.pick(&[0.012, 0.03, 0.06, 0.12]);
+        let half_angle = dice.pick(view.half_angles);
         let range = radii[0] / libm::sin(half_angle);
         config.body.altitude_km = Some(range - radii[0]);
-        let axis = direction(dice.between(0.0, 0.2), dice.between(0.0, core::f64::consts::TAU));
+        let off = if view.is_arc { half_angle + dice.between(-0.1, 0.1) } else { dice.between(0.0, 0.2) };
+        let axis = direction(off, dice.between(0.0, core::f64::consts::TAU));
+        let others = if view.is_arc { 0 } else { dice.pick(&[0, 0, 0, 1, 3]) };
         let north = unit([dice.between(-1.0, 1.0), dice.between(-1.0, 1.0), dice.between(-1.0, 1.0)]);
         let east = unit(cross(north, axis));
         let axes = [east, cross(north, east), north];
@@ -104,7 +120,10 @@ impl Scene {
 
 /// Draws how the position is fitted.
 fn position(dice: &mut Dice, config: &mut Config) {
-    config.fit.position = dice.pick(&[Some(true), Some(true), None, Some(false)]);
+    let is_fitted = dice.pick(&[Some(true), Some(true), None, Some(false)]);
+    if config.fit.position.is_none() {
+        config.fit.position = is_fitted;
+    }
     config.fit.yaw_limit_deg = dice.pick(&[1.0, 10.0, 90.0]);
     if config.fit.position == Some(true) {
         use fit::Method::{GeneralisedTls, LeastSquares, Sphere};
@@ -119,15 +138,20 @@ fn position(dice: &mut Dice, config: &mut Config) {
     }
 }
 
-fn discs(name: &'static str, seeds: core::ops::Range<u64>, bodies: &[(Kind, [f64; 3])], all_options: bool) {
+fn discs(name: &'static str, seeds: core::ops::Range<u64>, bodies: &[Shape], view: View, all_options: bool) {
     let mut table = Table::new(name);
     for seed in seeds {
         let mut dice = Dice::new(seed);
         let (kind, radii) = dice.pick(bodies);
-        let others = dice.pick(&[0, 0, 0, 1, 3]);
-        let mut scene = Scene::draw(&mut dice, kind, radii, others);
+        let mut scene = Scene::draw(&mut dice, kind, radii, view);
         if all_options {
             options::stages(&mut dice, &mut scene.config);
+        }
+        if view.hides_orientation {
+            scene.told.prior =
+                Prior { camera_temperature_c: scene.told.prior.camera_temperature_c, ..Prior::default() };
+            scene.told.quaternion = None;
+            scene.config.fit.position = Some(false);
         }
         position(&mut dice, &mut scene.config);
         if scene.config.fits_position(&scene.config.body) {
@@ -147,33 +171,45 @@ fn discs(name: &'static str, seeds: core::ops::Range<u64>, bodies: &[(Kind, [f64
     table.check();
 }
 
-const ROUND: [(Kind, [f64; 3]); 3] =
-    [(Kind::Moon, [1737.4; 3]), (Kind::Sphere, [1188.3; 3]), (Kind::Sun, [695_700.0; 3])];
-const FLAT: [(Kind, [f64; 3]); 4] = [
+type Shape = (Kind, [f64; 3]);
+
+const ROUND: [Shape; 3] = [(Kind::Moon, [1737.4; 3]), (Kind::Sphere, [1188.3; 3]), (Kind::Sun, [695_700.0; 3])];
+const FLAT: [Shape; 4] = [
     (Kind::Ellipsoid, [71_492.0, 71_492.0, 66_854.0]),
     (Kind::Ellipsoid, [286.3, 278.6, 223.2]),
     (Kind::Ellipsoid, [13.0, 11.4, 9.1]),
     (Kind::Saturn, [60_268.0, 60_268.0, 54_364.0]),
 ];
+const EARTH: Shape = (Kind::Earth, [6378.137, 6378.137, 6356.752]);
 
 #[test]
 fn of_round_bodies() {
-    discs("round", 1000..1080, &ROUND, false);
+    discs("round", 1000..1080, &ROUND, WHOLE, false);
 }
 
 #[test]
 fn of_round_bodies_with_drawn_options() {
-    discs("round_options", 1100..1180, &ROUND, true);
+    discs("round_options", 1100..1180, &ROUND, WHOLE, true);
 }
 
 #[test]
 fn of_flattened_bodies() {
-    discs("flat", 1200..1280, &FLAT, false);
+    discs("flat", 1200..1280, &FLAT, WHOLE, false);
 }
 
 #[test]
 fn of_flattened_bodies_with_drawn_options() {
-    discs("flat_options", 1300..1380, &FLAT, true);
+    discs("flat_options", 1300..1380, &FLAT, WHOLE, true);
+}
+
+#[test]
+fn of_parts_of_a_limb() {
+    discs("parts", 1600..1690, &[FLAT[0], FLAT[1], ROUND[1], EARTH], PART, false);
+}
+
+#[test]
+fn of_flattened_bodies_of_which_nothing_is_told() {
+    discs("untold", 1700..1790, &[FLAT[0], FLAT[1], EARTH, ROUND[1]], UNTOLD, false);
 }
 
 #[test]
