@@ -442,4 +442,9 @@ fn the_expected_limb_is_in_the_picture_and_on_its_section() {
         Limb::after(change, section::refuse)
     };
     assert_eq!((section(0.0), section(1.0)), (Ok(()), Err(Verdict::Residuals)));
+    // The same residual is the score of an edge with this choice.
+    let mut limb = Limb::exact();
+    limb.config.choice = Choice::SectionResidual;
+    limb.blocks[0].s[1][0] += 0.1;
+    assert_eq!(Some(score(&limb.case())), section::residual(&limb.case()).filter(|residual| *residual > 1e-6));
 }

@@ -54,6 +54,16 @@ impl Scene {
     /// Draws the limb by day.
     pub(super) fn day(&self, dice: &mut Dice) -> Vec<u8> {
         let light = Light::draw(dice);
+        self.in_light(&light, dice)
+    }
+
+    /// Draws a limb that every sensor finds.
+    pub(super) fn calm_day(&self, dice: &mut Dice) -> Vec<u8> {
+        let light = Light::calm(dice);
+        self.in_light(&light, dice)
+    }
+
+    fn in_light(&self, light: &Light, dice: &mut Dice) -> Vec<u8> {
         let seed = u64::from(dice.number());
         self.canvas.draw(light.noise, seed, |ray, at| ray.map_or(0.0, |ray| light.at(self, ray, at)))
     }

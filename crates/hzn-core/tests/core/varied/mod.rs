@@ -6,6 +6,8 @@
 //! weights, the fits with their error budgets, and the evidence. A column that differs names the stage that changed.
 //! `HZN_BLESS=1 cargo test --test core varied` writes the tables again.
 
+#[cfg(feature = "_edges")]
+mod apart;
 mod discs;
 mod journal;
 mod limbs;

@@ -9,11 +9,11 @@ use super::options::{self, Told};
 use super::{Dice, Table, grey};
 
 /// Adds the pictures of a sequence to a table.
-fn follow(table: &mut Table, seed: u64) {
+fn follow(table: &mut Table, seed: u64, is_calm: bool) {
     let mut dice = Dice::new(seed);
     let field_rad = dice.pick(&[0.4, 0.8, 1.3]);
     let mut scene = Scene::new(&mut dice, [256, 192], field_rad);
-    if dice.one_in(2) {
+    if !is_calm && dice.one_in(2) {
         options::stages(&mut dice, &mut scene.config);
     }
     scene.config.track.full_every = dice.pick(&[3, 25]);
@@ -30,9 +30,14 @@ fn follow(table: &mut Table, seed: u64) {
         if dice.one_in(6) {
             light = Dice::new(dice.number().into());
         }
-        let data = scene.day(&mut Dice(light.0));
+        let drawn = &mut Dice(light.0);
+        let data = if is_calm { scene.calm_day(drawn) } else { scene.day(drawn) };
         let rate = turn.map(|x| -x / 0.5);
-        let prior = Prior { rate_rad_s: is_told.then_some(rate), ..scene.told.prior };
+        let mut prior = Prior { rate_rad_s: is_told.then_some(rate), ..scene.told.prior };
+        if dice.one_in(9) {
+            // The predicted limb is then out of the picture, or in another part of it.
+            (prior.position_m, prior.altitude_m) = (None, Some(dice.pick(&[450e3, 3e6, 4e7])));
+        }
         let step = Step::from_prior(&prior, dice.pick(&[Some(0.5), Some(0.5), None]));
         let Ok(expected) = horizon.expect(&prior) else { continue };
         let journal = Journal::default();
@@ -47,14 +52,21 @@ fn follow(table: &mut Table, seed: u64) {
 #[test]
 fn of_sequences() {
     let mut table = Table::new("sequences");
-    (2000..2020).for_each(|seed| follow(&mut table, seed));
+    (2000..2020).for_each(|seed| follow(&mut table, seed, false));
     table.check();
 }
 
 #[test]
 fn of_more_sequences() {
     let mut table = Table::new("more_sequences");
-    (2100..2120).for_each(|seed| follow(&mut table, seed));
+    (2100..2120).for_each(|seed| follow(&mut table, seed, false));
+    table.check();
+}
+
+#[test]
+fn of_calm_sequences() {
+    let mut table = Table::new("calm_sequences");
+    (2400..2425).for_each(|seed| follow(&mut table, seed, true));
     table.check();
 }
 
