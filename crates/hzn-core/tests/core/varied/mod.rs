@@ -44,7 +44,7 @@ impl Dice {
         low + (high - low) * f64::from(self.number()) / f64::from(1u32 << 31)
     }
     fn one_in(&mut self, n: u32) -> bool {
-        self.number() % n == 0
+        self.number().is_multiple_of(n)
     }
     fn pick<X: Copy>(&mut self, all: &[X]) -> X {
         all[self.number() as usize % all.len()]
