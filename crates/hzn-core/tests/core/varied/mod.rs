@@ -21,7 +21,7 @@ use hzn_core::camera::{self, Camera};
 use hzn_core::image::{Grey, Layout, Pixels};
 use hzn_core::pixel::ImagePoint;
 use hzn_core::real::Real;
-use hzn_core::{Config, Horizon, Prior, Report};
+use hzn_core::{Config, Horizon, Observer, Prior, Report};
 
 use crate::drawn::Noise;
 use journal::Journal;
@@ -172,7 +172,8 @@ impl Table {
         match horizon.expect(prior) {
             Ok(expected) => {
                 let journal = Journal::default();
-                let report = horizon.process_observed(picture, &expected, &journal);
+                // Behind a pointer, so that other tests share the compiled pipeline.
+                let report = horizon.process_observed(picture, &expected, &(&journal as &dyn Observer<T>));
                 self.add(what, &report, &journal);
             }
             Err(error) => writeln!(self.lines, "{what},{error}").unwrap(),

@@ -1,7 +1,7 @@
 //! Sequences of pictures, with a tracker, and pictures that come row by row.
 
 use hzn_core::pipeline::{ROWS_HELD, RowBuffers};
-use hzn_core::{FlightHorizon, FlightWorkspace, HostHorizon, Prior, Sensor, Sequence, Step, Tracker};
+use hzn_core::{FlightHorizon, FlightWorkspace, HostHorizon, Observer, Prior, Sensor, Sequence, Step, Tracker};
 
 use super::journal::Journal;
 use super::limbs::Scene;
@@ -42,7 +42,8 @@ fn follow(table: &mut Table, seed: u64, is_calm: bool) {
         let Ok(expected) = horizon.expect(&prior) else { continue };
         let journal = Journal::default();
         let picture = grey(&scene.config, &data);
-        let mut report = horizon.track_observed(&mut tracker, &picture, (&expected, &step), &journal);
+        let mut report =
+            horizon.track_observed(&mut tracker, &picture, (&expected, &step), &(&journal as &dyn Observer<_>));
         let is_fixed = sequence.judge(&step, &mut report, &scene.config.gates);
         table.add(&format!("{seed} {i} {is_fixed} {:?}", report.next_level), &report, &journal);
         scene.move_by(turn);
@@ -121,7 +122,8 @@ fn of_a_known_rate_of_the_vehicle() {
             let prior = Prior { last, ..Told::default().single() };
             let expected = horizon.expect(&prior).unwrap();
             let journal = Journal::default();
-            let report = horizon.process_observed(&grey(&scene.config, &data), &expected, &journal);
+            let report =
+                horizon.process_observed(&grey(&scene.config, &data), &expected, &(&journal as &dyn Observer<_>));
             table.add(&format!("{seed} {i}"), &report, &journal);
             last = report.solution.map(|found| hzn_core::body::Last {
                 axis: found.axis,
