@@ -2,6 +2,7 @@
 
 use hzn_core::body::Kind;
 use hzn_core::camera::{self, Model};
+use hzn_core::frames::UnitVec3;
 use hzn_core::image::{Grey, Layout};
 use hzn_core::status::Status;
 use hzn_core::verdict::Verdict;
@@ -73,8 +74,12 @@ fn draw(config: &Config, discs: &[Disc], sky: f64, sigma: f64) -> Vec<u8> {
 }
 
 fn process(config: &Config, data: &[u8]) -> Report<f64> {
+    process_with(&Prior::default(), config, data)
+}
+
+fn process_with(prior: &Prior<f64>, config: &Config, data: &[u8]) -> Report<f64> {
     let mut horizon = HostHorizon::boxed(config).unwrap();
-    let expected = horizon.expect(&Prior::default()).unwrap();
+    let expected = horizon.expect(prior).unwrap();
     let layout = Layout::packed(config.camera.width.into(), config.camera.height.into(), 1, 8);
     horizon.process(&Grey::try_new(data, layout).unwrap(), &expected)
 }
@@ -280,6 +285,26 @@ fn what_lies_on_both_sides_of_an_edge_is_evidence() {
     thermal.body.sunlit = Some(false);
     let [flat, day] = [p_limb_of(&thermal, |km, _| air(km)), p_limb_of(&thermal, |km, _| limb_light(km))];
     assert!(flat > 0.9 && (odds(flat) / odds(day)).ln().abs() < 1.0, "thermal {flat} {day}");
+}
+
+#[test]
+fn the_sun_is_evidence_only_where_a_gate_asks_for_its_light() {
+    let mut config = earth_sensor();
+    let data = earth_edge(|km, _| air(km));
+    let sun = UnitVec3::try_new(unit([-0.1, -0.94, -0.33]));
+    assert!(sun.is_some());
+    let odds = |prior: &Prior<f64>, config: &Config| {
+        let p = process_with(prior, config, &data).solution.and_then(|s| s.p_limb).unwrap();
+        p / (1.0 - p)
+    };
+    let (told, untold) = (Prior { sun, ..Prior::default() }, Prior::default());
+    let without = odds(&untold, &config);
+    // Of the edges that are no limb, two in five follow the body all the same, and the Sun would light the wrong side of
+    // half of the others: seven in ten pass.
+    let ratio = odds(&told, &config) / without;
+    assert!((ratio - 10.0 / 7.0).abs() < 1e-6, "{ratio}");
+    config.gates.max_unlit = 1.0;
+    assert_eq!(odds(&told, &config), odds(&untold, &config));
 }
 
 #[test]

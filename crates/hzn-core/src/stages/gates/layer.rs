@@ -246,6 +246,16 @@ mod tests {
         assert!(!is_layer(&[]));
     }
 
+    #[test]
+    fn a_trough_is_deeper_than_the_noise_and_may_go_on() {
+        let sky = Sky { lit: 0.0, median: 10.0, spread: 10.0 };
+        let has = |lights: &[f64]| has_trough(&lights.iter().map(|light| light + 10.0).collect::<Profile<f64>>(), &sky);
+        // Half of the spread is 5 counts.
+        assert_eq!((has(&[20.0, 14.0, 14.0]), has(&[20.0, 16.0, 16.0])), (true, false));
+        // Its light may stay as it is, also near the edge; it must not rise there by half of its depth.
+        assert_eq!((has(&[100.0, 60.0, 60.0, 60.0]), has(&[100.0, 60.0, 60.0, 81.0])), (true, false));
+    }
+
     /// Returns the light of a Chapman layer at these depths below its edge, where half of its light is left, km.
     fn light_below(thick_km: f64, depths_km: impl Iterator<Item = f64>) -> Profile<f64> {
         let light = |above_peak_km: f64| -> f64 {
