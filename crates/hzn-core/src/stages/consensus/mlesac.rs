@@ -152,7 +152,8 @@ mod tests {
         let (cost, share) = mixture.cost(&blocks, &e, c);
         let weight = |i: usize| if i == 10 { 0.5 } else { 1.0 };
         // Of a circle about the optical axis, a pixel is the same angle everywhere.
-        let density = |i: usize| if i.is_multiple_of(2) { 0.797_884_56 * libm::exp(-2.0 * off_px[i] * off_px[i]) } else { 0.0 };
+        let density =
+            |i: usize| if i.is_multiple_of(2) { 0.797_884_56 * libm::exp(-2.0 * off_px[i] * off_px[i]) } else { 0.0 };
         let mut want = 0.5;
         for _ in 0..3 {
             let inlier = |i: usize| want * density(i) / (want * density(i) + (1.0 - want) / 2000.0);
