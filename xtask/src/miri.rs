@@ -40,8 +40,8 @@ const FLIGHT: &[&str] = &[
     "view::",
 ];
 
-/// Tests of hzn-flight that flip bits of its memory and expect that this is noticed: in Miri only the tests of hzn-twice
-/// compare the two copies, see `barrier`.
+/// Tests of hzn-flight that flip bits of its memory and expect that this is noticed. In Miri only the tests of
+/// hzn-twice compare the two copies, see `barrier`.
 const FLIPS: [&str; 4] = ["--skip", "flight::memory::", "--skip", "a_flipped_bit_costs_the_epoch"];
 
 /// Miri cannot run the square root of libm for x86-64, which is assembly; this feature of libm takes the portable one.

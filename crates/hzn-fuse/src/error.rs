@@ -31,8 +31,8 @@ impl Error {
     /// This program cannot solve a whole flight.
     pub(crate) fn without_solver() -> Self {
         Self::unusable(
-            "this hzn was built without the feature `solve`, so that it compiles faster; `cargo install --locked --path \
-             crates/hzn-cli` builds the whole command",
+            "this hzn was built without the feature `solve`, so that it compiles faster; the whole command is built by \
+             cargo install --locked --path crates/hzn-cli",
         )
     }
     pub(crate) fn failed(message: impl std::fmt::Display) -> Self {

@@ -299,8 +299,8 @@ fn the_sun_is_evidence_only_where_a_gate_asks_for_its_light() {
     };
     let (told, untold) = (Prior { sun, ..Prior::default() }, Prior::default());
     let without = odds(&untold, &config);
-    // Of the edges that are no limb, two in five follow the body all the same, and the Sun would light the wrong side of
-    // half of the others: seven in ten pass.
+    // Of the edges that are no limb, two in five follow the body all the same, and the Sun would light the wrong side
+    // of half of the others: seven in ten pass.
     let ratio = odds(&told, &config) / without;
     assert!((ratio - 10.0 / 7.0).abs() < 1e-6, "{ratio}");
     config.gates.max_unlit = 1.0;

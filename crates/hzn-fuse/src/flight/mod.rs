@@ -50,15 +50,20 @@ pub struct Wanted {
     pub rate_hz: Option<f64>,
 }
 
+impl Wanted {
+    /// Refuses what this program was built without.
+    fn check(self) -> Result<(), Error> {
+        if self.solved && !cfg!(feature = "solve") { Err(Error::without_solver()) } else { Ok(()) }
+    }
+}
+
 /// Fuses everything that a flight recorded.
 ///
 /// # Errors
 /// An input is missing or contradicts another one, no two directions give a first attitude, or there are more
 /// measurements than a smoother can keep.
 pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fused, Error> {
-    if wanted.solved && !cfg!(feature = "solve") {
-        return Err(Error::without_solver());
-    }
+    wanted.check()?;
     let mounts = mounts(&inputs.recordings)?;
     if inputs.imu.is_empty() {
         return without_unit(inputs, settings, &mounts, wanted);
