@@ -107,20 +107,24 @@ impl Table {
         self.lines.push('\n');
     }
 
-    /// Compares the table with the committed one.
     fn check(&self) {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/core/digits").join(format!("{}.csv", self.name));
-        if std::env::var_os("HZN_BLESS").is_some() {
-            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-            std::fs::write(&path, &self.lines).unwrap();
-            return;
-        }
-        let want = std::fs::read_to_string(&path).unwrap();
-        for (now, before) in self.lines.lines().zip(want.lines()) {
-            assert_eq!(now, before, "{}: if this change is meant, run again with HZN_BLESS=1", self.name);
-        }
-        assert_eq!(self.lines.lines().count(), want.lines().count());
+        compare_with_committed("digits", self.name, &self.lines);
     }
+}
+
+/// Compares a table with the committed one in a folder beside this file, or writes it with `HZN_BLESS=1`.
+pub(crate) fn compare_with_committed(folder: &str, name: &str, lines: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/core").join(folder).join(format!("{name}.csv"));
+    if std::env::var_os("HZN_BLESS").is_some() {
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, lines).unwrap();
+        return;
+    }
+    let want = std::fs::read_to_string(&path).unwrap();
+    for (now, before) in lines.lines().zip(want.lines()) {
+        assert_eq!(now, before, "{name}: if this change is meant, run again with HZN_BLESS=1");
+    }
+    assert_eq!(lines.lines().count(), want.lines().count());
 }
 
 #[test]
