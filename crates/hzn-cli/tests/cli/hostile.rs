@@ -160,7 +160,7 @@ fn eight_bombs_at_eight_threads_stay_small() {
         if name.starts_with("huge") || name == "scans.jpg" {
             assert_eq!(cell(&rows[8], "status"), "unreadable", "{name}");
         }
-        // Beside the one picture that is asked for, none is decoded.
+        // Only the picture that is asked for is decoded, and not the bombs beside it.
         let (code, peak) = peak_memory_kb(&mut place.command(&["run", "in/0000.png", "--jobs", "8", "-o", "one.csv"]));
         assert!(code == Some(0) && peak > 0 && peak < 200_000, "{name} beside the picture: {code:?}, {peak} kB");
         let rows = without_time(&place.read("one.csv"));

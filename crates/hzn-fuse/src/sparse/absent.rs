@@ -1,4 +1,4 @@
-//! Stands for `cholesky` where faer is left out, because it takes a seventh of the time to compile `hzn`: nothing can
+//! Stands for `cholesky` where faer is left out, because it takes a quarter of the time to compile `hzn`: nothing can
 //! be solved, and whoever asks is told.
 
 use std::convert::Infallible;

@@ -159,7 +159,8 @@ impl crate::model::observer::Observer<f64> for Reads {
     }
 }
 
-/// The third sample of a disc of 4 px, with a hot pixel beside it: the grid, then the window about the brightest place.
+/// Draws a disc of 4 px with a hot pixel beside it. The third sample takes the grid, then the window about the
+/// brightest place.
 #[test]
 fn a_body_between_the_places_of_both_samples_has_a_window_of_its_own() {
     let (width, height) = (640u16, 480u16);

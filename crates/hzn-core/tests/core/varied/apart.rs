@@ -1,4 +1,4 @@
-//! The stages called one by one, and what is expected of a picture before it is seen.
+//! These tests call the stages one by one, and compute what is expected of a picture before it is seen.
 
 use std::fmt::Write as _;
 
