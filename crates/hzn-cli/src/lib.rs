@@ -18,6 +18,8 @@ mod limbs_of_rig;
 mod origin;
 mod progress;
 mod refusals;
+#[cfg(feature = "simulator")]
+mod rendered;
 mod setup;
 mod tell;
 mod what_fits;

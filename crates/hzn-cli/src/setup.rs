@@ -6,8 +6,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
-use hzn_files::truth::Truth;
-use hzn_run::disk;
 use hzn_run::open::{Opened, Request, SensorChoice, frames_path, sensor_path};
 use hzn_run::sink::Target;
 use hzn_run::source::{Raw, is_stdin};
@@ -181,24 +179,6 @@ pub(crate) fn request(inputs: &[PathBuf], sensor: &SensorArgs, input: &InputArgs
         flight: sensor.flight,
         watch: None,
     })
-}
-
-/// Returns the pictures of an earlier rendering. These are the pictures that truth.csv in the folder lists, as only
-/// rendered pictures have a truth.
-pub(crate) fn rendered(folder: &Path) -> Vec<PathBuf> {
-    let Ok(mut before) = csv::Reader::from_path(folder.join("truth.csv")) else { return Vec::new() };
-    let truths = before.deserialize::<Truth>().map_while(Result::ok);
-    let paths = truths.map(|truth| folder.join(Path::new(&truth.file).file_name().unwrap_or_default()));
-    paths.filter(|path| path.is_file()).collect()
-}
-
-/// Removes the pictures of an earlier rendering, because new tables would not list them.
-pub(crate) fn clear_rendered(folder: &Path) -> Result<(), Stop> {
-    // A picture of several bodies is listed several times.
-    for path in rendered(folder).into_iter().filter(|path| path.is_file()) {
-        std::fs::remove_file(&path).map_err(|e| disk::cannot_write(&path, &e))?;
-    }
-    Ok(())
 }
 
 /// Returns a flag that Ctrl-C or a request to terminate sets. A second Ctrl-C ends the program at once.

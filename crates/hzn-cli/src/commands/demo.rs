@@ -13,7 +13,7 @@ use hzn_sim::Flight;
 use super::{evaluate, run as sequence};
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::origin::Origin;
-use crate::setup::clear_rendered;
+use crate::rendered;
 use crate::tell::{self, one_line};
 
 const ISS_PICTURE: &[u8] = include_bytes!("../../assets/iss-limb-2020-11-20.jpg");
@@ -48,7 +48,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let begin = Instant::now();
     let places = Places::new(folder);
-    clear_rendered(&places.flight)?;
+    rendered::clear(&places.flight)?;
     for dir in [&places.flight, &places.iss] {
         std::fs::create_dir_all(dir).map_err(|e| disk::cannot_write(dir, &e))?;
     }

@@ -2,6 +2,8 @@
 
 mod facts;
 mod other;
+#[cfg_attr(not(feature = "simulator"), path = "info/no_scene.rs")]
+mod scene;
 mod summary;
 
 use std::collections::BTreeMap;
@@ -12,7 +14,6 @@ use hzn_fuse::read_back;
 use hzn_mcap::{Contents, Reader, Row};
 use hzn_run::source::{self, decode, ending};
 use hzn_run::{checked_row, explain, provenance};
-use hzn_sim::Scenario;
 use serde_json::{Value, json};
 
 use facts::Facts;
@@ -284,7 +285,7 @@ fn sensor(file: &Path, kind: &str) -> Result<Facts, Stop> {
     // The function that reads the text below reports its errors.
     let table = text.parse::<toml::Table>().unwrap_or_default();
     if table.contains_key("trajectory") && table.contains_key("capture") {
-        return scene(&hzn_sim::scenario::parse(&text, file, None, None)?);
+        return scene::describe(&text, file);
     }
     if table.contains_key("head") {
         return Ok(other::rig(&hzn_files::rig::parse(&text, file)?));
@@ -299,24 +300,6 @@ fn sensor(file: &Path, kind: &str) -> Result<Facts, Stop> {
         out.fact("hash", format!("{hash} (overlays and reports name it)"), "hash", hash);
     }
     calibration(out, &sensor.config)
-}
-
-fn scene(scenario: &Scenario) -> Result<Facts, Stop> {
-    let mut out = Facts::new("scene", "scene, for `hzn simulate FILE`");
-    let (capture, camera) = (&scenario.capture, &scenario.camera);
-    out.fact("name", scenario.name.clone(), "name", scenario.name.clone());
-    let times = format!("{}, at {} to {} s from {}", capture.frames, capture.from_s, capture.to_s, scenario.utc);
-    out.fact("pictures", times, "pictures", capture.frames);
-    out.key("time_s", [capture.from_s, capture.to_s].to_vec());
-    out.key("utc", scenario.utc.to_string());
-    let text = format!("{} x {} px, {}", camera.width, camera.height, camera.model.name());
-    out.fact("camera", text, "camera", serde_json::to_value(camera).map_err(failed)?);
-    out.fact("bodies", scenario.body_names().join(", "), "bodies", scenario.body_names());
-    let instruments = [("imu.csv", scenario.imu.is_some()), ("gnss.csv", scenario.gnss.is_some())];
-    let written: Vec<&str> = instruments.iter().filter(|(_, there)| *there).map(|(name, _)| *name).collect();
-    let names = if written.is_empty() { "none".to_owned() } else { written.join(", ") };
-    out.fact("instruments", names, "instruments", written);
-    Ok(out)
 }
 
 fn one_picture(file: &Path) -> Result<Facts, Stop> {

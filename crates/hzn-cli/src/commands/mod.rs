@@ -3,6 +3,7 @@
 mod calibrate;
 mod camera;
 mod completions;
+#[cfg(feature = "simulator")]
 mod demo;
 mod evaluate;
 mod examples;
@@ -23,7 +24,9 @@ mod migrate;
 mod recover;
 mod resume;
 mod run;
+#[cfg(feature = "simulator")]
 mod sensitivity;
+#[cfg(feature = "simulator")]
 mod simulate;
 mod telecommand;
 mod telemetry;
@@ -65,6 +68,7 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    #[cfg(feature = "simulator")]
     Demo(demo::Args),
     Run(Box<run::Args>),
     Explain(explain::Args),
@@ -72,10 +76,12 @@ enum Command {
     Export(export::Args),
     Recover(recover::Args),
     Fuse(Box<fuse::Args>),
+    #[cfg(feature = "simulator")]
     Simulate(simulate::Args),
     Init(init::Args),
     Migrate(migrate::Args),
     Evaluate(evaluate::Args),
+    #[cfg(feature = "simulator")]
     Sensitivity(Box<sensitivity::Args>),
     Calibrate(calibrate::Args),
     Camera(camera::Args),
@@ -109,6 +115,7 @@ fn with_negative_numbers(command: clap::Command) -> clap::Command {
 pub fn run(cli: Cli) -> Outcome {
     tell::set_level(cli.verbose).map_err(usage)?;
     match cli.command {
+        #[cfg(feature = "simulator")]
         Command::Demo(args) => demo::run(&args),
         Command::Run(args) => run::run(*args),
         Command::Explain(args) => explain::run(&args),
@@ -116,10 +123,12 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Export(args) => export::run(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Fuse(args) => fuse::run(&args),
+        #[cfg(feature = "simulator")]
         Command::Simulate(args) => simulate::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Migrate(args) => migrate::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        #[cfg(feature = "simulator")]
         Command::Sensitivity(args) => sensitivity::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Camera(args) => camera::run(&args),

@@ -13,7 +13,8 @@ use rayon::prelude::*;
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::progress::Progress;
 use crate::refusals::quoted_path;
-use crate::setup::{clear_rendered, rendered, stop_flag};
+use crate::rendered;
+use crate::setup::stop_flag;
 use crate::tell::{self, one_line};
 
 /// Render a sequence of pictures with truth, and write a sensor.toml that fits it
@@ -110,7 +111,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let stop = stop_flag();
     for one in &cameras {
         if !args.resume {
-            clear_rendered(&one.folder)?;
+            rendered::clear(&one.folder)?;
         }
         one.tables()?;
         if one.pictures(args, &stop)? == Exit::Interrupted {
@@ -136,7 +137,7 @@ fn written(args: &Args, folder: &Path, cameras: &[Sequence], files: &[(String, V
     for Sequence { flight, folder, .. } in cameras {
         all.extend(["sensor.toml", "frames.csv", "truth.csv"].map(|name| folder.join(name)));
         let pictures = flight.frames.iter().flat_map(|frame| [frame.file.clone(), part_name(&frame.file)]);
-        all.extend(pictures.map(|name| folder.join(name)).chain(rendered(folder)));
+        all.extend(pictures.map(|name| folder.join(name)).chain(rendered::pictures(folder)));
     }
     all
 }
