@@ -119,7 +119,7 @@ pub(crate) fn kill(runs: u64) -> Outcome {
 }
 
 fn long(pictures: u64) -> Outcome {
-    steps::run(test("long", "the_answers_repeat").env("HZN_FRAMES", (10 * pictures).to_string()))?;
+    steps::run(test("core", "the_answers_repeat").env("HZN_FRAMES", (10 * pictures).to_string()))?;
     steps::run(test("cli", "campaign::a_long_run").env("HZN_PICTURES", pictures.to_string()))
 }
 

@@ -12,7 +12,7 @@ use crate::steps::{self, Outcome, Trouble, cargo};
 /// Processor, its emulator, and the order of the bytes of a number.
 const PROCESSORS: [(&str, &str, &str); 2] =
     [("aarch64", "qemu-aarch64", "little-endian"), ("powerpc64", "qemu-ppc64", "big-endian")];
-const EXAMPLE: [&str; 6] = ["--package", "hzn-core", "--features", "std", "--example", "digest"];
+const EXAMPLE: [&str; 6] = ["--package", "hzn-core", "--features", "_programs", "--example", "digest"];
 
 /// Runs the example `digest` of hzn-core over `pictures` on every processor.
 pub(crate) fn compare(pictures: u64) -> Outcome {

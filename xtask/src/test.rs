@@ -41,10 +41,13 @@ const STEPS: &[Step] = &[
     every("feature sets", |_| {
         // The tests above build it without features. A feature chooses by `cfg!`, so most code is always compiled.
         ["std,_edges", "serde", "dlr,zju,horace,erf,kalibr,position,reml"].into_iter().try_for_each(check_core_with)?;
+        // Two programs that no other step compiles.
+        let programs = ["check", "--quiet", "--package", "hzn-core", "--features", "_programs,position", "--examples"];
+        steps::run(&mut cargo(&programs))?;
         // The crates of the page, without files and threads: the workspace builds them with all features.
         steps::run(&mut cargo(&["check", "--quiet", "--package", "hzn-web"]))?;
-        // `cargo demo` leaves the solver out.
-        steps::run(&mut cargo(&["check", "--quiet", "--package", "hzn-fuse", "--no-default-features"]))
+        // A flight computer needs neither the simulator nor the solver.
+        steps::run(&mut cargo(&["check", "--quiet", "--package", "hzn-cli", "--no-default-features"]))
     }),
     every("documents", |_| steps::run(cargo(&["doc", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))),
     every("packages", |_| check_packages()),

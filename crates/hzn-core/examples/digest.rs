@@ -1,5 +1,5 @@
 //! Prints a checksum of every number in the answers to many pictures, so that processors can be compared:
-//! `cargo run --release -p hzn-core --example digest -- 2000`
+//! `cargo run --release -p hzn-core --features _programs --example digest -- 2000`
 
 #[path = "../tests/core/common/mod.rs"]
 mod common;

@@ -9,6 +9,7 @@ mod digits;
 mod drawn;
 #[cfg(feature = "position")]
 mod lit_side;
+mod long;
 mod precision;
 #[cfg(all(feature = "dlr", feature = "erf", feature = "horace", feature = "zju"))]
 mod published;

@@ -262,7 +262,7 @@ mod tests {
     fn a_day_takes_no_more_memory_than_an_hour() {
         let (mut live, now) = (Live::default(), Instant::now());
         for n in 0..100_000 {
-            live.take(vec![picture(n), Seen::Note(LogLevel::Info, "x".repeat(9000))], now);
+            live.take(vec![picture(n), Seen::Note(LogLevel::Info, "x".repeat(2 * MESSAGE_LENGTH))], now);
             live.send("ping");
             let at = now + Duration::from_millis(u64::from(n) * 100);
             live.take_counts(Counts { packets: n.into(), ..Counts::default() }, at);

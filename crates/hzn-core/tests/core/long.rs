@@ -1,14 +1,13 @@
-//! Many pictures through one sensor: the answers are those of the first pass, whatever came in between. The test looks
-//! at the memory of its process, so it has a process of its own.
+//! Many pictures through one sensor: the answers are those of the first pass, whatever came in between.
 
-#[path = "core/common/mod.rs"]
-mod common;
+use std::process::Command;
 
-use common::{KINDS, garbage};
 use hzn_core::body::Prior;
 use hzn_core::camera::{self, Model};
 use hzn_core::image::{Grey, Layout};
 use hzn_core::{Config, FlightHorizon, HostHorizon};
+
+use crate::common::{KINDS, garbage};
 
 /// Number of pictures; `cargo xtask campaign long` sets a million.
 fn pictures() -> usize {
@@ -28,8 +27,20 @@ fn processor_s() -> f64 {
     text.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).unwrap_or(0.0) * 1e-9
 }
 
+/// The memory is that of a whole process, so the test below runs in a process without the other tests.
 #[test]
 fn the_answers_repeat_and_the_memory_does_not_grow() {
+    let mut alone = Command::new(std::env::current_exe().unwrap());
+    alone.args(["--exact", "long::in_a_process_of_its_own", "--ignored", "--nocapture"]);
+    let out = alone.output().unwrap();
+    let text = String::from_utf8_lossy(&out.stdout);
+    println!("{text}{}", String::from_utf8_lossy(&out.stderr));
+    assert!(out.status.success() && text.contains("test result: ok. 1 passed"));
+}
+
+#[test]
+#[ignore = "the test above runs it"]
+fn in_a_process_of_its_own() {
     let mut config = Config::new(camera::Config::ideal(Model::Pinhole, 96, 64, 60.0));
     config.body.altitude_km = Some(300.0);
     config.edge_points.min_points = 8;
