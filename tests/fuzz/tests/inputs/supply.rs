@@ -1,7 +1,8 @@
 //! What hzn is built from: licences, sources, and the list of its parts.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use hzn_supply::{self as supply, Package};
 
@@ -200,4 +201,32 @@ fn the_version_names_the_features_that_the_manifest_turns_on() {
         all.iter().map(|f| f.as_str().unwrap()).filter(|f| !["serde", "std"].contains(f)).collect();
     let source = std::fs::read_to_string(root.join("crates/hzn-cli/src/commands/mod.rs")).unwrap();
     assert!(source.contains(&format!("features {}\"", methods.join(", "))), "{methods:?}");
+}
+
+/// Returns the sets of features with which `cargo tree` says that each crate is compiled.
+fn features(args: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
+    let mut tree = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    tree.args(["tree", "--locked", "--prefix", "none", "--format", "{p}|{f}"]).args(args).current_dir(supply::root());
+    let out = tree.output().unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let mut all = BTreeMap::<String, BTreeSet<String>>::new();
+    for line in String::from_utf8(out.stdout).unwrap().lines() {
+        let Some((package, features)) = line.trim_end_matches(" (*)").split_once('|') else { continue };
+        let name: Vec<&str> = package.split(' ').take(2).collect();
+        all.entry(name.join(" ")).or_default().insert(features.to_owned());
+    }
+    all
+}
+
+/// Another feature of one crate would compile all crates that use it a second time.
+#[test]
+fn the_wheel_takes_what_the_tests_have_compiled() {
+    let tests = features(&["--edges", "normal,build,dev"]);
+    let wheel = features(&["--edges", "normal,build", "--package", "hzn-py", "--features", "as-in-the-tests"]);
+    let others = |(name, sets): &(&String, &BTreeSet<String>)| {
+        let is_own = name.starts_with("hzn-py ");
+        !is_own && !tests.get(*name).is_some_and(|known| sets.is_subset(known))
+    };
+    let others: Vec<_> = wheel.iter().filter(others).collect();
+    assert!(wheel.len() > 100 && others.is_empty(), "of {}: {others:?}", wheel.len());
 }
