@@ -1,7 +1,7 @@
 //! The cost of a position: the time of one clean picture with `fit.position`, divided by the time without it.
 //!
-//! Run it with `cargo run --release --example position_cost -p hzn-core --features _programs,position`. The pictures take
-//! turns, and each ratio is of two neighbouring times, so that other programs on the machine disturb it little.
+//! Run it with `cargo run --release --example position_cost -p hzn-core --features _programs,position`. The pictures
+//! take turns, and each ratio is of two neighbouring times, so that other programs on the machine disturb it little.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
