@@ -3,6 +3,7 @@
     python rig_campaign.py --hzn target/release/hzn --flights 20 --first-seed 100 accuracy
     python rig_campaign.py --hzn target/release/hzn --flights 20 --first-seed 100 faults
     python rig_campaign.py --hzn target/release/hzn --flights 20 --first-seed 100 pair
+    python rig_campaign.py --hzn target/release/hzn --flights 20 --first-seed 100 radial
     python rig_campaign.py --hzn target/release/hzn --flights 10 --frames 100 coarse
     python rig_campaign.py --hzn target/release/hzn --flights 10 --frames 30 mounts
 
@@ -12,6 +13,8 @@ latitude is told or not. The mounts are exact, unless a fault turns one of them.
 `faults` turns told mounts, and changes the pictures of one head: repeated ones, those of another epoch, ghosts of the
 limb, ground without a limb. It needs opencv-python-headless.
 
+`radial` tells positions that are 300 km too high or too low, with a sigma of 300 km, and none at all.
+
 `coarse` flies the scene with random attitudes and pictures of a quarter of the size, and compares the coarse direction
 with the truth. `mounts` tells mounts that are wrong by about a degree, lets the vehicle turn, and compares the mounts of
 `hzn calibrate rig` with the true ones.
@@ -19,6 +22,7 @@ with the truth. `mounts` tells mounts that are wrong by about a degree, lets the
 
 import argparse
 import concurrent.futures
+import csv
 import math
 import pathlib
 import re
@@ -57,6 +61,54 @@ def accuracy_of(program, root, seed, frames):
                     for row in joint:
                         count.add(row, by_time(truth, row))
         shutil.rmtree(folder)
+    return counts
+
+
+RADIAL_KM = {"right position": 0.0, "300 km too high": 300.0, "300 km too low": -300.0, "no position": None}
+LIMITS_KM = [200.0, 800.0]
+
+
+def tell_position(folder, table, radial_km):
+    """Writes the table of the vehicle with positions that are radially wrong, or with none."""
+    rows = []
+    for row in table:
+        row = dict(row)
+        place = np.array([float(row[key]) for key in ("x_km", "y_km", "z_km")])
+        for key, x in zip(("x_km", "y_km", "z_km"), place * (1.0 + (radial_km or 0.0) / np.linalg.norm(place))):
+            row[key] = "" if radial_km is None else repr(float(x))
+        if "altitude_km" in row:
+            row["altitude_km"] = ""
+        rows.append(row)
+    with (folder / "frames.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(table[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def radial_of(program, root, seed, frames):
+    """Flies the scene with each error of the position. Returns the counts by name."""
+    folder, counts = root / f"radial-{seed}", {}
+    simulate(program, folder, "ring", seed, frames)
+    truth = truths(folder)
+    tell_limb(folder, False)
+    with (folder / "frames.csv").open() as file:
+        table = list(csv.DictReader(file))
+    texts = {head: (folder / head / "sensor.toml").read_text() for head in HEADS}
+    assert all("[gates]" not in text and "altitude_sigma_km" not in text for text in texts.values()), texts
+    for name, radial_km in RADIAL_KM.items():
+        tell_position(folder, table, radial_km)
+        for head, text in texts.items():
+            if radial_km is None:
+                text += f"\n[gates]\naltitude_limits_km = {LIMITS_KM}\n"
+            elif radial_km:
+                text = text.replace("[body]\n", "[body]\naltitude_sigma_km = 300.0\n")
+            (folder / head / "sensor.toml").write_text(text)
+        for which, heads in (("four", HEADS), ("two opposite", ["front", "back"])):
+            joint, _ = run(program, folder, write_rig(folder, heads))
+            count = counts.setdefault(f"{which}; {name}", Count())
+            for row in joint:
+                count.add(row, by_time(truth, row))
+    shutil.rmtree(folder)
     return counts
 
 
@@ -214,7 +266,7 @@ def merge(results):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["accuracy", "faults", "pair", "coarse", "mounts"])
+    parser.add_argument("what", choices=["accuracy", "faults", "pair", "radial", "coarse", "mounts"])
     parser.add_argument("--hzn", default="target/release/hzn")
     parser.add_argument("--flights", type=int, default=10)
     parser.add_argument("--first-seed", type=int, default=100)
@@ -232,7 +284,7 @@ def main():
 
         total = merge(fly(args, rig_faults.faults_of))
     else:
-        total = merge(fly(args, {"accuracy": accuracy_of, "pair": pair_of}[args.what]))
+        total = merge(fly(args, {"accuracy": accuracy_of, "pair": pair_of, "radial": radial_of}[args.what]))
     print(f"{args.flights} flights of {args.frames} epochs, seeds from {args.first_seed}\n")
     if args.what == "faults":
         print(rig_faults.HEAD)

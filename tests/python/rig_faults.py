@@ -130,7 +130,9 @@ def faults_of(program, root, seed, frames):
             axis = np.array([float(own[path.name][f"axis_{k}"]) for k in "xy"])
             ghost = with_ghost(read(path), -axis / np.linalg.norm(axis), size, random.uniform(0.3, 0.9))
             cv2.imwrite(str(path), ghost)
-        fly(("ghost outside of its limb", size, "four"), HEADS, [wrong])
+        for name, step in (("four", None), ("two opposite", 2), ("two adjacent", 1)):
+            heads = HEADS if step is None else [wrong, HEADS[(HEADS.index(wrong) + step) % 4]]
+            fly(("ghost outside of its limb", size, name), heads, [wrong])
     for heads, name in (([wrong], "ground in one head"), (HEADS, "ground in all heads")):
         restore()
         for head in heads:

@@ -1,13 +1,16 @@
 //! The limbs that the heads of a rig see together, as the adjustment of their mounts takes them.
 
 use hzn_calib::rig::{Adjusted, Check, Epoch, Refused, Settings, Sighting, adjust, check};
-use hzn_files::rig::{Common, Head};
+use hzn_files::rig::{Common, Head, Rig};
 use hzn_run::engine;
 use hzn_run::rig::{FinishedEpoch, Joiner, Seen};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 /// Speed of the point below a vehicle in low orbit, km/s, with which the limb passes its weather.
 const GROUND_SPEED_KM_S: f64 = 7.0;
+/// 1-sigma of the difference of two bands' limb heights, kilometres: a limb is at up to 45 km in the band of carbon
+/// dioxide, and between 0 and 25 km in visible light.
+const BAND_SIGMA_KM: f64 = 20.0;
 /// 1-sigma of each mount about each axis before the adjustment, degrees.
 pub(crate) const PRIOR_DEG: f64 = 5.0;
 
@@ -16,6 +19,8 @@ pub(crate) const PRIOR_DEG: f64 = 5.0;
 pub(crate) struct LimbsOfRig {
     heads: Vec<Head>,
     rig: Common,
+    /// Number of each head's limb group; the first head has 0.
+    limb_groups: Vec<u8>,
     radius_km: f64,
     epochs: Vec<Epoch>,
     times_s: Vec<f64>,
@@ -26,9 +31,10 @@ pub(crate) struct LimbsOfRig {
 
 impl LimbsOfRig {
     /// Begins without an epoch.
-    pub(crate) fn new(heads: Vec<Head>, rig: Common, joiner: &Joiner) -> Self {
+    pub(crate) fn new(file: &Rig, joiner: &Joiner) -> Self {
         let radius_km = joiner.limb().radius_km;
-        Self { heads, rig, radius_km, epochs: Vec::new(), times_s: Vec::new(), every: 1, seen: 0 }
+        let (heads, rig, limb_groups) = (file.heads.clone(), file.rig, file.limb_groups());
+        Self { heads, rig, limb_groups, radius_km, epochs: Vec::new(), times_s: Vec::new(), every: 1, seen: 0 }
     }
 
     /// Adds an epoch. With `without_excluded`, a head that the joint answer excludes does not count.
@@ -66,11 +72,17 @@ impl LimbsOfRig {
         let settings = Settings {
             told: self.heads.iter().map(told).collect(),
             prior_rad: prior_deg.to_radians(),
-            own_sigma_km: self.rig.limb_own_sigma_km,
+            own_sigma_km: self.limb_groups.iter().map(|group| self.own_sigma_km(*group)).collect(),
             radius_km: self.radius_km,
             independent: independent(&self.times_s, self.rig.limb_own_sigma_km, self.rig.limb_own_length_km),
         };
         adjust(&settings, &self.epochs)
+    }
+
+    /// Returns the 1-sigma of the height that a head's limb has besides that of the first head.
+    fn own_sigma_km(&self, group: u8) -> f64 {
+        let band_km = if group == 0 { 0.0 } else { BAND_SIGMA_KM };
+        self.rig.limb_own_sigma_km.hypot(band_km)
     }
 
     /// Returns the covariance of each told mount about the axes of the rig, rad².

@@ -22,6 +22,36 @@ pub struct Rig {
     pub heads: Vec<Head>,
 }
 
+impl Rig {
+    /// Returns the number of each head's limb group: heads with the same `limb_group` have the same number, and the
+    /// first head has 0.
+    ///
+    /// ```
+    /// let mut rig = hzn_files::rig::parse(
+    ///     "[[head]]
+    ///     name = \"left\"
+    ///     pictures = \"left\"
+    ///     mount.q_rig_from_camera_wxyz = [1.0, 0.0, 0.0, 0.0]",
+    ///     std::path::Path::new("rig.toml"),
+    /// )?;
+    /// rig.heads.extend_from_within(..);
+    /// rig.heads[1].limb_group = Some("infrared".to_owned());
+    /// assert_eq!(rig.limb_groups(), [0, 1]);
+    /// # Ok::<(), hzn_files::Problem>(())
+    /// ```
+    pub fn limb_groups(&self) -> Vec<u8> {
+        let mut names: Vec<&Option<String>> = Vec::new();
+        let mut number = |name| {
+            let place = names.iter().position(|other| *other == name).unwrap_or_else(|| {
+                names.push(name);
+                names.len() - 1
+            });
+            u8::try_from(place).unwrap_or(u8::MAX)
+        };
+        self.heads.iter().map(|head| number(&head.limb_group)).collect()
+    }
+}
+
 /// `[rig]`: what all heads share.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -104,6 +134,10 @@ pub struct Head {
     pub sensor: Option<PathBuf>,
     /// The pictures: a folder, a pattern or a video.
     pub pictures: PathBuf,
+    /// Name of the limb that the camera sees. Heads with another name see a limb of another height, as an infrared and
+    /// a visible camera do. `None` is a name, too.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limb_group: Option<String>,
     /// `[head.mount]`: the attitude of the camera on the rig. [`parse`] refuses a head without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mount: Option<HeadMount>,
@@ -203,6 +237,9 @@ pub fn check(file: &Rig) -> Result<(), (String, String)> {
         if file.heads.iter().take(i).any(|other| other.name == head.name) {
             return refused("name", format!("{:?} is also the name of another head", head.name));
         }
+        if let Some((name, why)) = head.limb_group.as_ref().and_then(|name| Some((name, find_bad_word(name)?))) {
+            return refused("limb_group", format!("{name:?} {why}"));
+        }
         let Some(mount) = &head.mount else {
             let what = "missing: give the attitude of the camera on the rig as q_rig_from_camera_wxyz, from the \
                         drawing; `hzn init --rig --camchain` takes it from a calibration of Kalibr (T_cn_cnm1), and \
@@ -251,6 +288,11 @@ fn find_bad_name(name: &str) -> Option<&'static str> {
     if RESERVED.contains(&name) {
         return Some("is the name of another frame of a recording; choose another one");
     }
+    find_bad_word(name)
+}
+
+/// Returns why a text is no name.
+fn find_bad_word(name: &str) -> Option<&'static str> {
     let is_plain = |c: char| c.is_alphanumeric() || c == '_';
     let is_good = name.starts_with(is_plain) && name.chars().all(|c| is_plain(c) || c == '-');
     // A spreadsheet takes a cell that begins with - for a formula.
@@ -322,6 +364,19 @@ mod tests {
     }
 
     #[test]
+    fn heads_with_one_name_of_a_limb_are_a_group() {
+        let groups = |names: &[Option<&str>]| {
+            let mut rig = read(TWO).unwrap();
+            let head = rig.heads[0].clone();
+            let of = |name: &Option<&str>| Head { limb_group: name.map(str::to_owned), ..head.clone() };
+            rig.heads = names.iter().map(of).collect();
+            rig.limb_groups()
+        };
+        assert_eq!(groups(&[None, None, None]), [0, 0, 0]);
+        assert_eq!(groups(&[Some("infrared"), None, Some("infrared"), Some("visible")]), [0, 1, 0, 2]);
+    }
+
+    #[test]
     fn errors_name_line_and_field() {
         let with = |from: &str, to: &str| read(&TWO.replacen(from, to, 1)).unwrap_err();
         assert_eq!(
@@ -354,6 +409,9 @@ mod tests {
                 .starts_with("rig.toml:1: [[head]] 1 mount: missing: give the attitude of the camera on the rig")
         );
         assert!(with("0.02", "-1").contains("[[head]] 2 mount.sigma_deg: -1 is refused: must be between 0 and 90"));
+        assert!(
+            with("sigma_deg = 0.02 }", "sigma_deg = 0.02 }\nlimb_group = \"a b\"").contains("limb_group: \"a b\" is")
+        );
         let not_one = "covariance_deg2 = [1, 2, 0, 1, 0, 1]";
         assert!(with("sigma_deg = 0.02", not_one).contains("mount.covariance_deg2: is not a covariance"));
         let common = |line: &str| read(&format!("[rig]\n{line}\n{TWO}")).unwrap_err();

@@ -95,7 +95,9 @@ mod tests {
 
     #[test]
     fn microseconds_survive() {
-        for us in (0..1_000_000).step_by(7).chain([1, 999_999, 4_294_967_295_999_999]) {
+        // Miri takes milliseconds for each.
+        let step = if cfg!(miri) { 7007 } else { 7 };
+        for us in (0..1_000_000).step_by(step).chain([1, 999_999, 4_294_967_295_999_999]) {
             for time in [Cuc::tai(us), Cuc::since_start(us)] {
                 assert_eq!(Cuc::from_bytes(time.to_bytes()), Some(time));
             }

@@ -85,6 +85,9 @@ fn setup(rig: &file::Rig) -> Setup {
         let mount = head.mount.as_ref();
         *place = mount.map_or([0.0; 6], |mount| mount.covariance_rad2().map(|x| x as f32));
     }
+    for (place, group) in setup.limb_groups.iter_mut().zip(rig.limb_groups()) {
+        *place = group;
+    }
     setup
 }
 

@@ -32,12 +32,14 @@ pub(crate) struct Rig {
 #[pymethods]
 impl Rig {
     #[new]
-    #[pyo3(signature = (sensors, *, mounts, names = None, mount_sigma_deg = 0.0, rig_sigma_deg = 0.0,
-                        limb_tilt_sigma_km = None, limb_own_sigma_km = None, false_alarm = None, misleading = None))]
+    #[pyo3(signature = (sensors, *, mounts, names = None, limb_groups = None, mount_sigma_deg = 0.0,
+                        rig_sigma_deg = 0.0, limb_tilt_sigma_km = None, limb_own_sigma_km = None, false_alarm = None,
+                        misleading = None))]
     fn new(
         sensors: Vec<Py<Sensor>>,
         mounts: Vec<[f64; 4]>,
         names: Option<Vec<String>>,
+        limb_groups: Option<Vec<Option<String>>>,
         mount_sigma_deg: f64,
         rig_sigma_deg: f64,
         limb_tilt_sigma_km: Option<f64>,
@@ -46,7 +48,8 @@ impl Rig {
         misleading: Option<f64>,
     ) -> PyResult<Self> {
         let names = names.unwrap_or_else(|| (0..sensors.len()).map(|k| format!("head{k}")).collect());
-        for (what, count) in [("mounts", mounts.len()), ("names", names.len())] {
+        let limb_groups = limb_groups.unwrap_or_else(|| vec![None; sensors.len()]);
+        for (what, count) in [("mounts", mounts.len()), ("names", names.len()), ("limb_groups", limb_groups.len())] {
             if count != sensors.len() {
                 return Err(errors::config(format!(
                     "{what}: {count} for {} sensors; give one for each",
@@ -63,13 +66,14 @@ impl Rig {
             ..default
         };
         common.mount.sigma_deg = rig_sigma_deg;
-        let head = |(name, q_rig_from_camera_wxyz): (&String, [f64; 4])| Head {
+        let head = |((name, q_rig_from_camera_wxyz), limb_group): ((&String, [f64; 4]), Option<String>)| Head {
             name: name.clone(),
             sensor: None,
             pictures: name.into(),
             mount: Some(HeadMount { q_rig_from_camera_wxyz, sigma_deg: mount_sigma_deg, covariance_deg2: None }),
+            limb_group,
         };
-        let file = rig::Rig { rig: common, heads: names.iter().zip(mounts).map(head).collect() };
+        let file = rig::Rig { rig: common, heads: names.iter().zip(mounts).zip(limb_groups).map(head).collect() };
         let states: Vec<_> = sensors.iter().map(|sensor| sensor.get().state()).collect();
         let configs = states.iter().map(|state| &state.config);
         let joiner = Joiner::new(&file, configs).map_err(errors::config)?;

@@ -40,6 +40,7 @@ struct Kept {
     rig: Rig<f32>,
     common: Common<f32>,
     mounts: [Option<Mount<f32>>; MOST_HEADS],
+    limb_groups: [u8; MOST_HEADS],
     heads: [Option<Head>; MOST_HEADS],
 }
 
@@ -96,6 +97,7 @@ pub unsafe extern "C" fn hzn_rig_usual(setup: *mut HznRigSetup) -> i32 {
         sigma_rad: 0.0,
         q_vehicle_from_camera_wxyz: [[f32::NAN; 4]; HZN_RIG_HEADS],
         mount_cov_rad2: [[0.0; 6]; HZN_RIG_HEADS],
+        limb_groups: [0; HZN_RIG_HEADS],
     };
     // SAFETY: the pointer is neither null nor unaligned, and the caller guarantees the rest.
     unsafe { setup.write(usual) };
@@ -226,7 +228,9 @@ impl Kept {
         let is_good = |x: &f32| x.is_finite() && *x >= 0.0;
         let tilt = (!setup.limb_tilt_sigma_km.is_nan()).then_some(setup.limb_tilt_sigma_km);
         let is_length_good = setup.limb_own_length_km.is_finite() && setup.limb_own_length_km >= 1.0;
-        if !sigmas.iter().chain(&tilt).all(is_good) || !is_length_good {
+        let limb_groups = setup.limb_groups.map(|group| u8::try_from(group).unwrap_or(u8::MAX));
+        let are_groups_good = limb_groups.iter().all(|group| usize::from(*group) < MOST_HEADS);
+        if !sigmas.iter().chain(&tilt).all(is_good) || !is_length_good || !are_groups_good {
             return None;
         }
         let mut mounts = [None; MOST_HEADS];
@@ -251,6 +255,7 @@ impl Kept {
             rig: Rig::new(&Config { false_alarm: setup.false_alarm, misleading: setup.misleading }).ok()?,
             common: Common { limb, sigma_rad: setup.sigma_rad },
             mounts,
+            limb_groups,
             heads: [const { None }; MOST_HEADS],
         })
     }
@@ -258,7 +263,8 @@ impl Kept {
     fn join(&self, out: &mut HznRigAnswer) {
         let start_s = self.heads.iter().flatten().map(|head| head.time_s).find(|time_s| !time_s.is_nan());
         let mut answered = [None; MOST_HEADS];
-        for ((place, head), mount) in answered.iter_mut().zip(&self.heads).zip(&self.mounts) {
+        let groups = self.mounts.iter().zip(self.limb_groups);
+        for ((place, head), (mount, limb_group)) in answered.iter_mut().zip(&self.heads).zip(groups) {
             let Some((head, mount)) = head.as_ref().zip(mount.as_ref()) else { continue };
             *place = head.solution.as_ref().map(|solution| Answered {
                 solution,
@@ -266,6 +272,7 @@ impl Kept {
                 mount,
                 time_s: start_s.map(|start_s| (head.time_s - start_s) as f32).filter(|time_s| !time_s.is_nan()),
                 rate_rad_s: head.rate_rad_s,
+                limb_group,
             });
         }
         let set = |members: [bool; MOST_HEADS]| {

@@ -157,6 +157,8 @@ pub struct HznRigSetup {
     pub q_vehicle_from_camera_wxyz: [[f32; 4]; 4],
     /// Covariance of each mount: xx, xy, xz, yy, yz, zz of a small rotation about the axes of the vehicle, rad².
     pub mount_cov_rad2: [[f32; 6]; 4],
+    /// Number of the limb that each head sees, 0 to 3: heads of different bands see limbs of different heights.
+    pub limb_groups: [u32; 4],
 }
 
 /// The joint answer of a rig. A set of heads has the bit 2^k for head k. Without a direction (status not 0) its numbers

@@ -76,7 +76,7 @@ fn four_heads_have_the_bits_and_the_cost_of_four_heads() {
         .map(|k| {
             // The clock of the image counts its calls, and nothing turns.
             let (solution, camera, mount) = (&solutions[k], sensors[k].camera(), &mounts[k]);
-            Some(Answered { solution, camera, mount, time_s: None, rate_rad_s: None })
+            Some(Answered { solution, camera, mount, time_s: None, rate_rad_s: None, limb_group: 0 })
         })
         .collect();
     let limb = Limb {

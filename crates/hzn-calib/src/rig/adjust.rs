@@ -31,7 +31,7 @@ pub struct Settings {
     /// 1-sigma of each mount about each axis before the adjustment, radians.
     pub prior_rad: f64,
     /// 1-sigma of the limb height that each head has for itself in all pictures, kilometres.
-    pub own_sigma_km: f64,
+    pub own_sigma_km: Vec<f64>,
     /// Distance of the limb from the centre of the body, kilometres.
     pub radius_km: f64,
     /// The number of independent epochs divided by that of the epochs: pictures that follow each other fast see the
@@ -128,14 +128,15 @@ pub fn adjust(settings: &Settings, epochs: &[Epoch]) -> Result<Adjusted, Refused
 fn the_wrong_head(settings: &Settings, epochs: &[Epoch]) -> Option<usize> {
     let heads = settings.told.len();
     let agree_without = |k: &usize| {
-        let mut told = settings.told.clone();
+        let (mut told, mut own_sigma_km) = (settings.told.clone(), settings.own_sigma_km.clone());
         told.remove(*k);
+        own_sigma_km.remove(*k);
         let others = epochs.iter().map(|epoch| {
             let mut epoch = epoch.clone();
             epoch.remove(*k);
             epoch
         });
-        adjust_all(&Settings { told, ..settings.clone() }, &others.collect::<Vec<_>>()).is_ok()
+        adjust_all(&Settings { told, own_sigma_km, ..settings.clone() }, &others.collect::<Vec<_>>()).is_ok()
     };
     let mut all = (0..heads).filter(|_| heads > 2).filter(agree_without);
     all.next().filter(|_| all.next().is_none())
@@ -240,7 +241,7 @@ impl Sums {
             }
             let i = OF_HEAD * k + 3;
             // A height that is told exactly is nearly fixed.
-            let sigma_km = settings.own_sigma_km.max(1e-3);
+            let sigma_km = settings.own_sigma_km.get(k).copied().unwrap_or_default().max(1e-3);
             normal[(i, i)] += sigma_km.powi(-2);
             right[i] -= place.heights_km[k] * sigma_km.powi(-2);
         }

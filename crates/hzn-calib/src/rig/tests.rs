@@ -14,7 +14,8 @@ const HALF_ARC_RAD: f64 = 0.55;
 const EDGE_RAD: f64 = 3.5e-4;
 
 fn settings(told: Vec<Rotation3<f64>>) -> Settings {
-    Settings { told, prior_rad: 5f64.to_radians(), own_sigma_km: 1.5, radius_km: RADIUS_KM, independent: 1.0 }
+    let own_sigma_km = vec![1.5; told.len()];
+    Settings { told, prior_rad: 5f64.to_radians(), own_sigma_km, radius_km: RADIUS_KM, independent: 1.0 }
 }
 
 /// Heads around the vehicle's z axis, of which each looks at the limb.

@@ -84,5 +84,5 @@ fn head((folder, Mount(q)): (&PathBuf, &Mount)) -> Result<Head, Stop> {
     }
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mount = HeadMount { q_rig_from_camera_wxyz: *q, sigma_deg: WRITTEN_SIGMA_DEG, covariance_deg2: None };
-    Ok(Head { name, sensor: None, pictures: folder.clone(), mount: Some(mount) })
+    Ok(Head { name, sensor: None, pictures: folder.clone(), mount: Some(mount), limb_group: None })
 }

@@ -46,6 +46,7 @@ mod rig_answers;
 mod rig_campaign;
 mod rig_mounts;
 mod rig_resume;
+mod rig_scene;
 mod run;
 mod sensitivity;
 mod shell;

@@ -4,7 +4,7 @@ use hzn_core::frames::Cov3;
 use nalgebra::Matrix3;
 
 use crate::common::{Place, cell};
-use crate::rig::{ring, run};
+use crate::rig_scene::{ring, ring_of, run};
 
 fn number(row: &[(String, String)], name: &str) -> f64 {
     cell(row, name).parse().unwrap_or_else(|_| panic!("{name}: {:?}", cell(row, name)))
@@ -131,4 +131,74 @@ fn without_altitude_and_limits_the_keys_are_named() {
     assert_eq!(statuses, ["ok", "no-limb", "no-limb", "no-limb"]);
     assert!(cell(&joint[1], "detail").contains("set gates.altitude_limits_km in their sensor.toml"), "{joint:?}");
     assert_eq!(heads.iter().filter(|row| cell(row, "status") == "no-altitude").count(), 12);
+}
+
+/// Names the limb of every second head.
+fn name_limbs(place: &Place) {
+    let mut rig = place.read("ring/rig.toml");
+    for head in ["right", "left"] {
+        let pictures = format!("pictures = \"{head}\"\n");
+        assert!(rig.contains(&pictures), "{rig}");
+        rig = rig.replace(&pictures, &format!("{pictures}limb_group = \"carbon-dioxide\"\n"));
+    }
+    place.write("ring/rig.toml", rig.as_bytes());
+}
+
+#[test]
+fn heads_of_two_bands_share_only_the_direction() {
+    let place = ring();
+    // The limb of the right and the left head is 20 km higher, as in another band. Each sensor knows its own limb.
+    let other = ring_of(|scene| scene.replace("[world.infrared]\n", "[world.infrared]\nhalf_level_km = 45.0\n"));
+    for head in ["right", "left"] {
+        for entry in std::fs::read_dir(other.path(&format!("ring/{head}"))).unwrap() {
+            let name = entry.unwrap().file_name().into_string().unwrap();
+            let file = format!("ring/{head}/{name}");
+            std::fs::copy(other.path(&file), place.path(&file)).unwrap();
+        }
+    }
+    let (joint, _) = run(&place, &[], 0);
+    let agree =
+        joint.iter().filter(|row| cell(row, "status") == "ok" && cell(row, "heads_excluded").is_empty()).count();
+    assert_eq!((joint.len(), agree), (4, 0));
+    name_limbs(&place);
+    let deg = rms_deg(&place);
+    assert!(deg < 0.03, "{deg}");
+    let (joint, _) = run(&place, &[], 0);
+    for row in &joint {
+        assert_eq!((cell(row, "status"), cell(row, "heads_used")), ("ok", "front right back left"), "{row:?}");
+        assert!(number(row, "separation_deg") < number(row, "separation_limit_deg"));
+        // The height is that of the first head's band.
+        assert!((number(row, "limb_height_est_km") - 25.0).abs() < 8.0, "{row:?}");
+    }
+}
+
+#[test]
+fn heads_that_should_see_the_limb_and_do_not_are_evidence_against_it() {
+    let place = ring();
+    let (joint, heads) = run(&place, &[], 0);
+    for row in &joint {
+        let own = heads.iter().filter(|head| cell(head, "index") == cell(row, "index"));
+        let most = own.map(|head| number(head, "p_limb")).fold(0.0, f64::max);
+        assert_eq!(number(row, "p_limb"), most, "all heads have an answer");
+    }
+    // Two heads see a bright ground without a limb.
+    for head in ["right", "left"] {
+        for i in 0..4_u32 {
+            let brightness = |x: u32, y: u32| image::Luma([(120 + (x * 7 + y * 13 + i) % 11) as u8]);
+            let name = std::fs::read_dir(place.path(&format!("ring/{head}"))).unwrap();
+            let mut names: Vec<_> = name.map(|entry| entry.unwrap().path()).collect();
+            names.retain(|path| path.extension().is_some_and(|ending| ending == "png"));
+            names.sort();
+            image::GrayImage::from_fn(320, 240, brightness).save(&names[i as usize]).unwrap();
+        }
+    }
+    let (joint, heads) = run(&place, &[], 0);
+    for row in &joint {
+        assert_eq!((cell(row, "status"), cell(row, "heads_used")), ("ok", "front back"), "{row:?}");
+        let own = heads.iter().filter(|head| cell(head, "index") == cell(row, "index") && cell(head, "status") == "ok");
+        let most = own.map(|head| number(head, "p_limb")).fold(0.0, f64::max);
+        let odds = |p: f64| p / (1.0 - p);
+        let ratio = odds(number(row, "p_limb")) / odds(most);
+        assert!((ratio - 0.01).abs() < 1e-4, "{ratio}");
+    }
 }

@@ -1,7 +1,7 @@
 //! Each head against the solution of the others.
 
 use super::head::Head;
-use super::joint::{Cone, Joint, NoJoint, axis_sigma, chosen, invert};
+use super::joint::{Cone, Joint, NoJoint, axis_sigma, chosen, invert, without_cosine};
 use crate::base::error::{ConfigError, Limit};
 use crate::base::linalg::M3;
 use crate::base::real::Real;
@@ -39,6 +39,8 @@ impl Default for Config {
 pub struct Rig<T> {
     /// Limit of χ² with three degrees of freedom for 2, 3 and 4 heads, in this order.
     limits: [T; MOST_HEADS - 1],
+    /// The same with two degrees of freedom, for a head that sees another limb than all others.
+    limits_of_axis: [T; MOST_HEADS - 1],
     /// Sigmas of a Gaussian direction (two dimensions, its worse one) that are exceeded with the probability.
     sigmas: T,
 }
@@ -52,9 +54,12 @@ impl<T: Real> Rig<T> {
                 return Err(ConfigError { field: name, value, limit: Limit::Between(LEAST, MOST), body: None });
             }
         }
-        let limit = |heads: f64| T::from_f64(quantile(config.false_alarm / heads, survival_of_three));
+        let limits = |survival: fn(f64) -> f64| {
+            [2.0, 3.0, 4.0].map(|heads| T::from_f64(quantile(config.false_alarm / heads, survival)))
+        };
         Ok(Self {
-            limits: [limit(2.0), limit(3.0), limit(4.0)],
+            limits: limits(survival_of_three),
+            limits_of_axis: limits(survival_of_two),
             sigmas: T::from_f64(quantile(config.misleading, survival_of_two).sqrt()),
         })
     }
@@ -72,7 +77,7 @@ impl<T: Real> Rig<T> {
         let (set, cone) = self.consistent_set(heads, all)?;
         let separated = self.separate(heads, set, &cone);
         let var_tilt = tilt_rad * tilt_rad;
-        let p = &cone.covariance;
+        let p = &cone.covariance();
         let excluded = all & !set;
         // A tilt of the limb is common, as a whole.
         let of_axis =
@@ -81,7 +86,7 @@ impl<T: Real> Rig<T> {
             axis: UnitVec3::assume_unit(cone.e),
             covariance: of_axis(p),
             common: cone.common(heads, set).as_ref().map(of_axis),
-            cos: (cone.c, p.m33.max(T::ZERO).sqrt()),
+            cos: (cone.cos(), p.m33.max(T::ZERO).sqrt()),
             heads_used: set,
             heads_excluded: excluded,
             separation_rad: separated.as_ref().map(|s| s.worst),
@@ -114,31 +119,62 @@ impl<T: Real> Rig<T> {
     /// Compares each head of a set with the solution of the others. `None` with one head, or if the others of a head do
     /// not determine a cone.
     fn separate(&self, heads: &[Option<Head<T>>], set: u8, cone: &Cone<T>) -> Option<Separation<T>> {
-        let count = set.count_ones() as usize;
-        let limit = *self.limits.get(count.checked_sub(2)?)?;
+        let place = (set.count_ones() as usize).checked_sub(2)?;
+        let (limit, limit_of_axis) = (*self.limits.get(place)?, *self.limits_of_axis.get(place)?);
         let mut out = Separation { agrees: true, worst: (T::ZERO, T::ZERO), bound: [(T::ZERO, T::ZERO); MOST_HEADS] };
         let mut largest = -T::one();
         for (k, head) in chosen(heads, set) {
-            let (j, r) = cone.seen_by(head);
-            let weighted = j.transpose() * head.information;
-            let others = invert(&(cone.normal - weighted * j))?;
-            // The solution of the others relative to that of all: the gradient of the sum is zero at the cone of all.
-            let moved = -(others * (weighted * r));
-            let innovation = r - j * moved;
-            let spread = head.covariance + j * others * j.transpose();
-            let q = innovation.dot(&(invert(&spread)? * innovation));
-            let allowed = limit.sqrt() * axis_sigma(&(others - cone.covariance));
+            let is_alone = chosen(heads, set).all(|(other, h)| other == k || h.group != head.group);
+            let against = against_others(head, cone, is_alone)?;
+            let limit = if is_alone { limit_of_axis } else { limit };
+            let allowed = limit.sqrt() * axis_sigma(&(against.others - cone.covariance()));
+            // A head alone in its group has another limit, so its distance counts in parts of it.
+            let q = against.q / limit;
             if q > largest {
                 largest = q;
-                out.worst = ((moved.x * moved.x + moved.y * moved.y).sqrt(), allowed);
+                out.worst = (against.moved_rad, allowed);
             }
-            out.agrees &= q <= limit;
+            out.agrees &= against.q <= limit;
             if let Some(bound) = out.bound.get_mut(k) {
-                *bound = (allowed, axis_sigma(&others));
+                *bound = (allowed, axis_sigma(&against.others));
             }
         }
         Some(out)
     }
+}
+
+/// A head against the solution of the others.
+struct Against<T> {
+    /// χ² of the head.
+    q: T,
+    /// The angle by which the axis moves without the head, in radians.
+    moved_rad: T,
+    /// Covariance of the others' solution.
+    others: M3<T>,
+}
+
+/// Compares a head with the solution of the others. The others of a head that is alone in its limb group know nothing
+/// of its half-angle, so only the directions are compared. `None` if the others do not determine a cone.
+fn against_others<T: Real>(head: &Head<T>, cone: &Cone<T>, is_alone: bool) -> Option<Against<T>> {
+    let (j, mut r) = cone.seen_by(head);
+    let weighted = j.transpose() * head.information;
+    let (mut normal, _) = cone.group(head.group)?;
+    let (mut own, mut right, mut covariance) = (weighted * j, weighted * r, head.covariance);
+    if is_alone {
+        (own, right) = without_cosine(&own, &right);
+        (normal, _) = without_cosine(&normal, &right);
+        // The cosine stays as an unknown that nothing moves.
+        normal.m33 = T::one();
+        r.z = T::ZERO;
+        (covariance.m13, covariance.m31, covariance.m23, covariance.m32) = (T::ZERO, T::ZERO, T::ZERO, T::ZERO);
+    }
+    let others = invert(&(normal - own))?;
+    // The solution of the others relative to that of all: the gradient of the sum is zero at the cone of all.
+    let moved = -(others * right);
+    let innovation = r - j * moved;
+    let spread = covariance + j * others * j.transpose();
+    let q = innovation.dot(&(invert(&spread)? * innovation));
+    Some(Against { q, moved_rad: (moved.x * moved.x + moved.y * moved.y).sqrt(), others })
 }
 
 /// What the comparison of a set's heads says.

@@ -37,7 +37,7 @@ const CONTRADICTING: f64 = 0.05;
 
 /// Sine of the lowest elevation of the Sun at which a place is surely lit, 6 degrees. A lower Sun gives the ground less
 /// than a tenth of the light of a high one.
-const SURELY_LIT: f64 = 0.1;
+pub(super) const SURELY_LIT: f64 = 0.1;
 
 /// Half-angles of a body of unknown distance: a body that is smaller is no help, and nothing is nearer than its
 /// surface.

@@ -25,6 +25,8 @@ pub struct Answered<'a, T> {
     pub time_s: Option<T>,
     /// Rate of rotation of the camera in its own axes, rad/s.
     pub rate_rad_s: Option<[T; 3]>,
+    /// Group of heads that see one limb, from 0 to 3, see [`Head::in_limb_group`].
+    pub limb_group: u8,
 }
 
 /// What the heads share.
@@ -59,7 +61,11 @@ pub struct EpochAnswer<T> {
     /// attitude of the rig. A mean of n such answers has the covariance common + (covariance − common)/n. `None` if it
     /// is not known of a head.
     pub common: Option<Cov3<Vehicle, T>>,
-    /// Half-angle of the limb, rad.
+    /// Probability that the edge of the answer is the limb: the largest of the heads that are used. Heads that agree
+    /// are further evidence, which is not counted, because what they share may deceive all of them. See
+    /// [`doubted_by`](Self::doubted_by) for heads without an answer. `None` if no head knows it.
+    pub p_limb: Option<T>,
+    /// Half-angle of the limb, rad; with several limb groups that of the first used head.
     pub half_angle_rad: T,
     /// 1σ of the cosine of that half-angle; `None` if the half-angle was not fitted.
     pub cos_sigma: Option<T>,
@@ -112,6 +118,7 @@ impl<T: Real> Rig<T> {
             axis: joint.axis,
             covariance: joint.covariance,
             common: joint.common,
+            p_limb: p_limb(heads, joint.heads_used),
             half_angle_rad: (T::one() - cos * cos).max(T::ZERO).sqrt().atan2(cos),
             cos_sigma: Some(joint.cos.1),
             heads_used: joint.heads_used,
@@ -160,6 +167,7 @@ fn single<T: Real>(common: &Common<T>, head: &Answered<'_, T>, k: u8) -> Option<
         axis,
         covariance: in_vehicle(&solution.covariance),
         common: solution.common.as_ref().map(in_vehicle),
+        p_limb: solution.p_limb,
         half_angle_rad: solution.half_angle_rad,
         cos_sigma: solution.free.as_ref().map(|free| free.var_cos.max(T::ZERO).sqrt()),
         heads_used: 1 << k,
@@ -182,7 +190,14 @@ fn cone<T: Real>(common: &Common<T>, head: &Answered<'_, T>, time_s: Option<T>) 
     let free = common.limb.with_weather(head.solution.free.as_ref()?, head.camera);
     let after_s = time_s.zip(head.time_s).map_or(T::ZERO, |(epoch_s, own_s)| epoch_s - own_s);
     let mount = head.mount.after(after_s, head.rate_rad_s)?;
-    Head::new(&free, &mount, head.mount.covariance_rad2(), T::ZERO)
+    let cone = Head::new(&free, &mount, head.mount.covariance_rad2(), T::ZERO)?;
+    Some(cone.in_limb_group(head.limb_group))
+}
+
+/// Returns the largest probability of the limb in a set of heads.
+fn p_limb<T: Real>(heads: Heads<'_, '_, T>, set: u8) -> Option<T> {
+    let of_set = heads.iter().enumerate().filter(|(k, _)| set >> k & 1 == 1);
+    of_set.filter_map(|(_, head)| head.as_ref()?.solution.p_limb).reduce(T::max)
 }
 
 /// Returns the middle of the exposures of a set of heads.

@@ -1,5 +1,6 @@
 //! What one head saw.
 
+use super::check::MOST_HEADS;
 use crate::base::linalg::{M3, V3, basis, invert_spd3};
 use crate::base::real::Real;
 use crate::geometry::frames::{Cam, Cov3, Rotation, UnitVec3, Vehicle};
@@ -18,6 +19,8 @@ pub struct Head<T> {
     pub(super) information: M3<T>,
     /// The part of the covariance that the next epoch shares; `None` if it is not known.
     pub(super) common: Option<M3<T>>,
+    /// Heads of one group see the same limb.
+    pub(super) group: usize,
 }
 
 impl<T: Real> Head<T> {
@@ -56,7 +59,16 @@ impl<T: Real> Head<T> {
             covariance,
             information: invert_spd3(&upper(&covariance))?,
             common: free.common.map(|p| seen(&p.covariance, p.axis_with_cos.into(), p.var_cos)),
+            group: 0,
         })
+    }
+
+    /// Puts the head into a limb group, of the numbers 0 to 3; larger ones count as 3. New heads are in group 0.
+    ///
+    /// The heads of a group see one limb, so their half-angles are equal. An infrared and a visible head see limbs of
+    /// different heights: in groups of their own they share only the direction.
+    pub fn in_limb_group(self, group: u8) -> Self {
+        Self { group: usize::from(group).min(MOST_HEADS - 1), ..self }
     }
 
     /// Returns the axis of the head's cone in the axes of the vehicle.

@@ -15,14 +15,18 @@
 //! r_k = (−B_kᵀ e, c_k − c),   J_k = [[B_kᵀ B, 0], [0, 1]],   A = Σ J_kᵀ C_k⁻¹ J_k,   δ = A⁻¹ Σ J_kᵀ C_k⁻¹ r_k
 //! ```
 //!
+//! Heads of different bands see limbs of different heights. Each such limb group has a cosine c of its own. From the
+//! equations of a head, the cosines of the other groups are eliminated (Schur complement), so that A stays 3×3.
+//!
 //! The next epoch shares a part of the error of each head: mount, lens, common shift and tilt of its edge, weather of
 //! the limb. With the covariance K_k of this part, the joint answer shares Σ G_k K_k G_kᵀ with the next one, where
 //! G_k = A⁻¹ J_kᵀ C_k⁻¹. A wrong limb height of all heads is in the common cosine, and not in the axis.
 //!
 //! The check compares each head with the solution of the others: q_k = νᵀ (C_k + J_k A₋ₖ⁻¹ J_kᵀ)⁻¹ ν has the χ²
-//! distribution with three degrees of freedom. This is solution separation, as in the integrity monitoring of
-//! navigation receivers (RAIM). A head is excluded only if exactly one exclusion leaves heads that agree; otherwise
-//! nothing says which head is wrong, and there is no answer. Two heads can notice a fault and cannot name it.
+//! distribution with three degrees of freedom, or with two for a head that is alone in its limb group. This is solution
+//! separation, as in the integrity monitoring of navigation receivers (RAIM). A head is excluded only if exactly one
+//! exclusion leaves heads that agree; otherwise nothing says which head is wrong, and there is no answer. Two heads can
+//! notice a fault and cannot name it.
 //!
 //! The check does not see what all heads share: a wrong scale of all lenses, a clock, a tilt of the limb. It does not
 //! see a turn of one mount about the direction to the body, either, but this turn does not move the axis.
@@ -67,6 +71,7 @@ mod glimpse;
 mod head;
 mod joint;
 mod mount;
+mod unanswered;
 mod weather;
 
 pub use check::{Config, MOST_HEADS, Rig};
@@ -76,4 +81,5 @@ pub use glimpse::Glimpse;
 pub use head::Head;
 pub use joint::{Joint, NoJoint};
 pub use mount::Mount;
+pub use unanswered::Unanswered;
 pub use weather::Limb;

@@ -7,6 +7,7 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::dice::Dice;
 
+mod groups;
 mod shared;
 
 /// Half-angle of the Earth's limb from 500 km.

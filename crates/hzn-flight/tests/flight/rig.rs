@@ -65,6 +65,7 @@ fn four_heads_are_one_answer() {
                     mount: &mounts[k],
                     time_s: Some(0.0),
                     rate_rad_s: None,
+                    limb_group: 0,
                 })
             })
             .collect();

@@ -224,6 +224,9 @@ class Rig:
         For each head, the rotation from the camera to the vehicle as a unit quaternion (w, x, y, z).
     names
         Name of each head, with letters, digits, ``_`` and ``-``; without it, ``head0``, ``head1`` and so on.
+    limb_groups
+        Name of the limb that each head sees, or ``None``. Heads with different names see limbs of different heights,
+        as an infrared and a visible camera do, and share only the direction. Without it, all heads see one limb.
     mount_sigma_deg
         1-sigma of each mount about each axis, degrees.
     rig_sigma_deg
@@ -250,6 +253,7 @@ class Rig:
         *,
         mounts: Sequence[Sequence[float]],
         names: Sequence[str] | None = None,
+        limb_groups: Sequence[str | None] | None = None,
         mount_sigma_deg: float = 0.0,
         rig_sigma_deg: float = 0.0,
         limb_tilt_sigma_km: float | None = None,

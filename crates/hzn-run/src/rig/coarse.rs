@@ -41,17 +41,21 @@ pub(super) fn set(row: &mut Row, sensors: &[Sensor<f64>], mounts: &[Mount<f64>],
         Some(GlimpsedHead { glimpse, level, camera: sensor.camera(), mount })
     });
     let half_angle = all().find_map(|((sensor, _), head)| half_angles(sensor, head));
-    let sun = || {
-        all().find_map(|((_, mount), head)| {
-            let sun: UnitVec3<Cam, f64> = engine::prior(head.frame?.data.as_ref(), 0, body).ok()?.sun?;
-            Some(mount.after(0.0, None)?.apply(&sun))
-        })
-    };
-    let light = if body.is_seen_in_sunlight() { Light::Sun(sun()) } else { Light::Own };
-    if let Some(coarse) = coarse(glimpsed, half_angle, &light) {
+    if let Some(coarse) = coarse(glimpsed, half_angle, &light(sensors, mounts, heads)) {
         [row.coarse_x, row.coarse_y, row.coarse_z] = coarse.axis.xyz().map(Some);
         row.coarse_sigma_deg = Some(coarse.sigma_rad.to_degrees());
     }
+}
+
+/// Returns the light in which the heads see their first body.
+pub(super) fn light(sensors: &[Sensor<f64>], mounts: &[Mount<f64>], heads: &[Seen<'_>]) -> Light<f64> {
+    let body = sensors.first().and_then(|sensor| sensor.config().each_body().first());
+    let Some(body) = body.filter(|body| body.is_seen_in_sunlight()) else { return Light::Own };
+    let of_head = |(mount, head): (&Mount<f64>, &Seen<'_>)| {
+        let sun: UnitVec3<Cam, f64> = engine::prior(head.frame?.data.as_ref(), 0, body).ok()?.sun?;
+        Some(mount.after(0.0, None)?.apply(&sun))
+    };
+    Light::Sun(mounts.iter().zip(heads).find_map(of_head))
 }
 
 /// Returns the limits of the half-angle of the first body in the picture of a head, radians; `None` if nothing is known

@@ -4,7 +4,7 @@ use hzn_core::body;
 use hzn_core::fit::HalfAngle;
 use hzn_core::frames::{Cov3, UnitVec3, Vehicle};
 use hzn_core::report::Free;
-use hzn_core::rig::{Answered, Common, EpochAnswer, Limb, Mount, NoJoint, Rig};
+use hzn_core::rig::{Answered, Common, EpochAnswer, Limb, Mount, NoJoint, Rig, Unanswered};
 use hzn_core::status::Status;
 use hzn_core::{Config, Sensor};
 use hzn_files::rig::{self, JOINT};
@@ -24,6 +24,7 @@ pub struct Joiner {
     sync_s: f64,
     names: Vec<String>,
     mounts: Vec<Mount<f64>>,
+    limb_groups: Vec<u8>,
     sensors: Vec<Sensor<f64>>,
     body: body::Config,
 }
@@ -64,6 +65,7 @@ impl Joiner {
             sync_s: file.rig.sync_s,
             names: file.heads.iter().map(|head| head.name.clone()).collect(),
             mounts: file.heads.iter().filter_map(mount).collect(),
+            limb_groups: file.limb_groups(),
             sensors: own,
             body,
         })
@@ -124,7 +126,11 @@ impl Joiner {
         let epoch = self.rig.join_epoch(&self.common, &answered);
         let time_s = epoch.time_s.zip(start_s).map(|(after_s, start_s)| start_s + after_s).or(start_s);
         let mut row = match epoch.answer {
-            Ok(answer) => self.answer(index, heads, time_s, &answer),
+            Ok(answer) => {
+                let answer =
+                    answer.doubted_by(self.unanswered(heads), &coarse::light(&self.sensors, &self.mounts, heads));
+                self.answer(index, heads, time_s, &answer)
+            }
             Err(NoJoint::NoHead) => self.nothing(index, heads, time_s),
             Err(why) => {
                 let detail = match why {
@@ -158,7 +164,15 @@ impl Joiner {
             // The picture's data have the rate in the axes of the camera, whether it comes from the table of the
             // vehicle or of the head.
             rate_rad_s: frame.data.as_ref().and_then(|data| data.rate_rad_s),
+            limb_group: self.limb_groups.get(k).copied().unwrap_or_default(),
         })
+    }
+
+    /// Returns the heads that have a picture of their own without an answer.
+    fn unanswered<'a>(&'a self, heads: &'a [Seen<'_>]) -> impl Iterator<Item = Unanswered<'a, f64>> {
+        let all = self.sensors.iter().zip(&self.mounts).zip(heads);
+        let without = all.filter(|(_, head)| head.has_no_limb());
+        without.map(|((sensor, mount), _)| Unanswered { camera: sensor.camera(), region: sensor.region(), mount })
     }
 
     fn row(&self, index: u64, heads: &[Seen<'_>], time_s: Option<f64>, status: Status, detail: &str) -> Row {
@@ -205,6 +219,7 @@ impl Joiner {
         row.half_angle_deg = Some(answer.half_angle_rad.to_degrees());
         let used = heads.iter().enumerate().find(|(k, _)| answer.heads_used >> k & 1 == 1);
         self.set_heights(&mut row, used, answer);
+        row.p_limb = answer.p_limb;
         row.protection_deg = answer.protection_rad.map(f64::to_degrees);
         row.heads_used = self.listed(answer.heads_used);
         row.heads_excluded = self.listed(answer.heads_excluded);

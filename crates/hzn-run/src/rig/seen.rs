@@ -41,6 +41,12 @@ impl<'a> Seen<'a> {
         report.solution.as_ref().filter(|_| report.status == Status::Ok)
     }
 
+    /// Returns whether the head looked for the limb in a picture of its own, and has no answer.
+    pub(super) fn has_no_limb(&self) -> bool {
+        let status = self.frame.and_then(|frame| Some(frame.outcomes.first()?.status()));
+        self.repeats.is_none() && matches!(status, Some(Status::NoLimb | Status::Rejected | Status::TooFewPoints))
+    }
+
     /// Returns why the head has no part in the joint answer; `None` if it has an answer.
     pub(super) fn absence(&self) -> Option<String> {
         let Some(frame) = self.frame else { return Some("no picture".into()) };

@@ -35,6 +35,7 @@ impl Scenario {
                 sigma_deg: camera.mount_error_deg,
                 covariance_deg2: None,
             }),
+            limb_group: None,
         };
         Some(Rig { rig: self.rig?, heads: self.cameras.iter().map(head).collect() })
     }

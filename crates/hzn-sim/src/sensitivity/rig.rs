@@ -49,8 +49,9 @@ impl RigDesign {
         let solution = free.and_then(|free| self.solution(&free, half_angle_rad));
         let mounts: Option<Vec<Mount<f64>>> = self.azimuths_deg.iter().map(|azimuth| self.mount(*azimuth)).collect();
         let Some((solution, mounts)) = solution.zip(mounts) else { return Ok(None) };
+        let (solution, camera) = (&solution, &camera);
         let answered =
-            |mount| Some(Answered { solution: &solution, camera: &camera, mount, time_s: None, rate_rad_s: None });
+            |mount| Some(Answered { solution, camera, mount, time_s: None, rate_rad_s: None, limb_group: 0 });
         let heads: Vec<_> = mounts.iter().map(answered).collect();
         let limb = Limb {
             radius_km: self.head.radius_km + self.head.limb_height_km,

@@ -191,7 +191,7 @@ fn a_flipped_bit_is_refused_or_has_no_effect() {
 fn impossible_calls_are_refused() {
     let (mut memory, mut rig) = (Memory::<HZN_RIG_SIZE>::new(), ptr::null_mut());
     let good = setup(|_| ());
-    let refused: [fn(&mut HznRigSetup); 8] = [
+    let refused: [fn(&mut HznRigSetup); 9] = [
         |s| s.false_alarm = 0.7,
         |s| s.misleading = 0.0,
         |s| s.limb_tilt_sigma_km = -1.0,
@@ -200,6 +200,7 @@ fn impossible_calls_are_refused() {
         |s| s.sigma_rad = f32::INFINITY,
         |s| s.q_vehicle_from_camera_wxyz[1] = [0.0; 4],
         |s| s.mount_cov_rad2[3][0] = -1.0,
+        |s| s.limb_groups[2] = 4,
     ];
     let program = Program::new(&good);
     // SAFETY: pointers are null or valid.

@@ -139,7 +139,7 @@ struct Found {
 /// Processes the pictures. `None` if the run was interrupted.
 fn look(args: &Args, opened: Opened) -> Result<Option<Found>, Stop> {
     let (joiner, total) = (opened.joiner()?, opened.pictures());
-    let limbs = LimbsOfRig::new(opened.rig.heads.clone(), opened.rig.rig, &joiner);
+    let limbs = LimbsOfRig::new(&opened.rig, &joiner);
     let sync_s = opened.rig.rig.sync_s;
     let head = |head: &rig::OpenHead| HeadPlan {
         name: head.name.clone(),

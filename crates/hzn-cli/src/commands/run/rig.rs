@@ -36,7 +36,7 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
     let plan = plan(args, &opened)?;
     let texts: Vec<_> = opened.heads.iter().map(|head| head.sensor.text.clone()).collect();
     let (total, text) = (opened.pictures(), opened.text.clone());
-    let (mounts, common, false_alarm) = (opened.rig.heads.clone(), opened.rig.rig, opened.rig.rig.false_alarm);
+    let (rig, false_alarm) = (opened.rig.clone(), opened.rig.rig.false_alarm);
     let mut input = Input { request, tables: tables(&opened), epochs: epochs(opened)? };
     let heads: Vec<_> =
         plan.heads.iter().zip(texts).map(|(head, text)| (head.name.clone(), &head.plan.config, text)).collect();
@@ -53,7 +53,7 @@ pub(super) fn run(args: &Args, path: &Path) -> Outcome {
     };
     output.run_again_from(start.epoch());
     let done = stored.epochs.iter().map(|epoch| epoch.pictures() as u64).sum();
-    let limbs = LimbsOfRig::new(mounts, common, &plan.joiner);
+    let limbs = LimbsOfRig::new(&rig, &plan.joiner);
     let mut watch = Watch::new(args.quiet, total, (stored.frames, done), limbs);
     let end =
         rig::run(&plan, &mut input.epochs, start, &stop_flag(), &mut output, &mut |epoch| watch.see(epoch, &plan));

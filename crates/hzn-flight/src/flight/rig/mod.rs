@@ -59,6 +59,8 @@ pub struct Setup {
     /// Covariance of the mount of each head: xx, xy, xz, yy, yz, zz of a small rotation about the axes of the vehicle,
     /// rad².
     pub mounts_rad2: [[f32; 6]; MOST_HEADS],
+    /// Number of the limb that each head sees, 0 to 3: heads of different bands see limbs of different heights.
+    pub limb_groups: [u8; MOST_HEADS],
 }
 
 impl Setup {
@@ -74,6 +76,7 @@ impl Setup {
             limb_own_length_km: Limb::<f32>::OWN_LENGTH_KM,
             sigma_rad: 0.0,
             mounts_rad2: [[0.0; 6]; MOST_HEADS],
+            limb_groups: [0; MOST_HEADS],
         }
     }
 
@@ -333,6 +336,7 @@ impl<'h, 'a, B: RigBoard, const N: usize> Rig<'h, 'a, B, N> {
                 mount: mounts.get(k)?.as_ref()?,
                 time_s: Some((head.exposure_us - opened_us) as f32 * 1e-6),
                 rate_rad_s: head.rate_rad_s,
+                limb_group: self.setup.limb_groups.get(k).copied().unwrap_or_default(),
             })
         });
         let joint = rig.join_epoch(&common, &answered);
