@@ -94,14 +94,14 @@ def radial_of(program, root, seed, frames):
     with (folder / "frames.csv").open() as file:
         table = list(csv.DictReader(file))
     texts = {head: (folder / head / "sensor.toml").read_text() for head in HEADS}
-    assert all("[gates]" not in text and "altitude_sigma_km" not in text for text in texts.values()), texts
+    assert all("[gates]" not in text and "\naltitude_sigma_km" in text for text in texts.values()), texts
     for name, radial_km in RADIAL_KM.items():
         tell_position(folder, table, radial_km)
         for head, text in texts.items():
             if radial_km is None:
                 text += f"\n[gates]\naltitude_limits_km = {LIMITS_KM}\n"
             elif radial_km:
-                text = text.replace("[body]\n", "[body]\naltitude_sigma_km = 300.0\n")
+                text = re.sub(r"(?m)^altitude_sigma_km = .*$", "altitude_sigma_km = 300.0", text)
             (folder / head / "sensor.toml").write_text(text)
         for which, heads in (("four", HEADS), ("two opposite", ["front", "back"])):
             joint, _ = run(program, folder, write_rig(folder, heads))

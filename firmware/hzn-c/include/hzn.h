@@ -233,6 +233,8 @@ typedef struct {
   float q_vehicle_from_camera_wxyz[4][4];
   // Covariance of each mount: xx, xy, xz, yy, yz, zz of a small rotation about the axes of the vehicle, rad².
   float mount_cov_rad2[4][6];
+  // Number of the limb that each head sees, 0 to 3: heads of different bands see limbs of different heights.
+  uint32_t limb_groups[4];
 } HznRigSetup;
 
 // The joint answer of a rig. A set of heads has the bit 2^k for head k. Without a direction (status not 0) its numbers
@@ -277,7 +279,7 @@ HZN_ASSERT(sizeof(HznKnown) == 112, "the size of HznKnown");
 HZN_ASSERT(sizeof(HznPicture) == 3 * sizeof(size_t) + 8, "the size of HznPicture");
 HZN_ASSERT(sizeof(HznEdge) == 24, "the size of HznEdge");
 HZN_ASSERT(sizeof(HznAnswer) == 516, "the size of HznAnswer");
-HZN_ASSERT(sizeof(HznRigSetup) == 192, "the size of HznRigSetup");
+HZN_ASSERT(sizeof(HznRigSetup) == 208, "the size of HznRigSetup");
 HZN_ASSERT(sizeof(HznRigAnswer) == 72, "the size of HznRigAnswer");
 #undef HZN_ASSERT
 

@@ -61,6 +61,43 @@ fn axis(row: &[(String, String)]) -> [f64; 3] {
     ["axis_x", "axis_y", "axis_z"].map(|name| cell(row, name).parse().unwrap())
 }
 
+/// Asserts that the joint answers of a flight are those of `hzn run --flight`.
+fn assert_joined_alike(flown: &Rows, run: &Rows) {
+    assert_eq!(flown.len(), run.len());
+    for (flown, run) in flown.iter().zip(run) {
+        for column in ["file", "status", "body", "altitude_km", "heads_used", "heads_excluded"] {
+            assert_eq!(cell(flown, column), cell(run, column), "{column}: {flown:?}");
+        }
+        // The flight software joins in single precision.
+        assert!(angle_deg(axis(flown), axis(run)) < 1e-4, "{flown:?}\n{run:?}");
+        for column in ["time_s", "sigma_max_deg", "half_angle_deg", "separation_deg", "protection_deg"] {
+            let [a, b] = [flown, run].map(|row| cell(row, column).parse::<f64>().unwrap());
+            assert!((a - b).abs() < 1e-4 + 1e-3 * b.abs(), "{column}: {a} {b}");
+        }
+    }
+}
+
+#[test]
+fn heads_of_two_bands_fly_as_they_run() {
+    let place = ring("2");
+    let run = || {
+        place.run(&["run", "ring/rig.toml", "--flight", "-o", "run.csv", "-q", "--force"]).expect(0);
+        divided(place.rows("run.csv")).0
+    };
+    let of_one_band = run();
+    let heads = place.read("ring/rig.toml");
+    place.write(
+        "ring/rig.toml",
+        heads.replace("pictures = \"left\"", "pictures = \"left\"\nlimb_group = \"b\"").as_bytes(),
+    );
+    let of_two = run();
+    place.run(&["fly", "ring/rig.toml", "--state", "state"]).expect(0);
+    assert_joined_alike(&logged(&place).0, &of_two);
+    // A head that is alone in its group says less.
+    let sigma_deg = |row: &[(String, String)]| cell(row, "sigma_max_deg").parse::<f64>().unwrap();
+    assert!(of_two.iter().zip(&of_one_band).all(|(two, one)| sigma_deg(two) > sigma_deg(one)), "{of_two:?}");
+}
+
 #[test]
 fn recorded_heads_fly_as_they_run() {
     let place = ring("4");
@@ -81,17 +118,7 @@ fn recorded_heads_fly_as_they_run() {
             of_head(&run_heads, head).into_iter().filter(|row| cell(row, "status") != "unreadable").collect();
         assert_eq!(of_head(&heads, head), run, "{head}");
     }
-    for (flown, run) in joint.iter().zip(&run_joint) {
-        for column in ["file", "status", "body", "altitude_km", "heads_used", "heads_excluded"] {
-            assert_eq!(cell(flown, column), cell(run, column), "{column}: {flown:?}");
-        }
-        // The flight software joins in single precision.
-        assert!(angle_deg(axis(flown), axis(run)) < 1e-4, "{flown:?}\n{run:?}");
-        for column in ["time_s", "sigma_max_deg", "half_angle_deg", "separation_deg", "protection_deg"] {
-            let [a, b] = [flown, run].map(|row| cell(row, column).parse::<f64>().unwrap());
-            assert!((a - b).abs() < 1e-4 + 1e-3 * b.abs(), "{column}: {a} {b}");
-        }
-    }
+    assert_joined_alike(&joint, &run_joint);
     let used: Vec<&str> = joint.iter().map(|row| cell(row, "heads_used")).collect();
     assert_eq!(used, ["front right back left", "front back left", "front right left", "front right back"]);
     // The recording names its heads.
