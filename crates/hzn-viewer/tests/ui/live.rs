@@ -326,6 +326,8 @@ fn pictures_are_shown_as_they_arrive() {
     assert_eq!(window.state().frame_view().unwrap().name, "new-5.png");
     // Pictures that were never shown are processed, too.
     until(&mut window, "not all are processed", |v| v.processed() == 10);
+    // The work ends until the next picture comes, so that a picture of the window can be taken.
+    until(&mut window, "the work does not end", |v| !v.is_working());
     assert_eq!(files(&pictures).len(), 11);
 }
 

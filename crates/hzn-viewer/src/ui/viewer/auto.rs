@@ -67,16 +67,18 @@ impl Viewer {
             (self.work.running, self.work.stopped) = (None, false);
             self.work.due = Some(Instant::now() + AFTER_CHANGE);
         }
-        if self.follow.is_open {
-            let own = self.session.as_ref().and_then(|s| slot(s, true));
-            return self.work_on_added(own.into_iter().collect());
+        if self.work.stopped || (self.work.due.is_none() && !self.follow.is_open) {
+            return;
         }
-        let Some(due) = self.work.due.filter(|_| !self.work.stopped) else { return };
-        let left = due.saturating_duration_since(Instant::now());
+        let left = self.work.due.map_or(Duration::ZERO, |due| due.saturating_duration_since(Instant::now()));
         if !left.is_zero() {
             return ctx.request_repaint_after(left);
         }
         self.work.due = None;
+        if self.follow.is_open {
+            let own = self.session.as_ref().and_then(|s| slot(s, true));
+            return self.work_on_added(own.into_iter().collect());
+        }
         let slots = self.missing_slots();
         if !slots.is_empty() {
             let task = Task {

@@ -87,7 +87,7 @@ impl Viewer {
     /// Processes the pictures of a growing sequence that were not shown, or not with the current parameters.
     pub(super) fn work_on_added(&mut self, slots: Vec<Slot>) {
         let is_due = self.follow.worked.is_none_or(|at| at.elapsed() >= WORK_EVERY);
-        if !is_due || self.work.running.is_some() || self.work.stopped || slots.is_empty() {
+        if !is_due || self.work.running.is_some() || slots.is_empty() {
             return;
         }
         let missing = |i: &usize| self.rows.current(*i, self.body).is_none();
