@@ -162,12 +162,14 @@ mod tests {
     #[test]
     fn every_flipped_bit_and_every_cut_is_seen() {
         let (mut bytes, n) = sample();
-        for bit in 0..n * 8 {
+        // Each flip is a checksum of the whole table, which is long in Miri.
+        let (bits, cuts) = if cfg!(miri) { (1009, 101) } else { (1, 1) };
+        for bit in (0..n * 8).step_by(bits) {
             bytes[bit / 8] ^= 1 << (bit % 8);
             assert!(generation(&bytes).is_none(), "bit {bit}");
             bytes[bit / 8] ^= 1 << (bit % 8);
         }
-        for cut in 0..n {
+        for cut in (0..n).step_by(cuts) {
             assert!(read(&bytes[..cut]).is_err());
         }
     }

@@ -62,7 +62,8 @@ fn every_changed_bit_is_refused() {
     let key = Key { spacecraft: 1, number: 2, secret: [0xC3; 32] };
     let mut user = [7; 5 + TRAILER_BYTES];
     key.seal(ApidBase::DEFAULT, 8, 1, 5, &mut user).unwrap();
-    for bit in 0..8 * user.len() {
+    // A code is long in Miri.
+    for bit in (0..8 * user.len()).step_by(if cfg!(miri) { 19 } else { 1 }) {
         let mut changed = user;
         changed[bit / 8] ^= 1 << (bit % 8);
         assert!(!key.is_right(ApidBase::DEFAULT, 8, &changed), "{bit}");

@@ -44,7 +44,8 @@ mod tests {
     fn a_bit_that_is_stuck_fails_the_self_check() {
         let mut memory = [0; MAX_BYTES];
         assert!(memory_works(&mut memory, |_| ()));
-        for bit in 0..8 * MAX_BYTES {
+        // Each bit is a walk over the whole memory, which is long in Miri.
+        for bit in (0..8 * MAX_BYTES).step_by(if cfg!(miri) { 97 } else { 1 }) {
             assert!(!memory_works(&mut memory, |m| m[bit / 8] |= 1 << (bit % 8)), "bit {bit} stuck at 1");
             assert!(!memory_works(&mut memory, |m| m[bit / 8] &= !(1 << (bit % 8))), "bit {bit} stuck at 0");
         }
