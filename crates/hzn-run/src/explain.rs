@@ -137,9 +137,17 @@ const ORDER: &[Verdict] = &[
 /// Returns the candidate that most probably is the body: the one that reached the furthest gate, and among several the
 /// one with the most inliers. Structure in view can have more inliers than the limb, but it fails an early gate.
 pub fn best_candidate(r: &Report<f64>) -> Option<&Candidate<f64>> {
-    let reached = |c: &Candidate<f64>| ORDER.iter().position(|verdict| *verdict == c.verdict);
     // Among equals the first is used. It begins next to the longest dark stretch of the border.
-    r.candidates.iter().rev().max_by_key(|c| (reached(c), c.inliers))
+    r.candidates.iter().rev().max_by_key(|c| (reached(c.verdict), c.inliers))
+}
+
+/// Returns the verdict of the best candidate, of which only the verdict is known.
+pub fn best_verdict(verdicts: impl IntoIterator<Item = Verdict>) -> Option<Verdict> {
+    verdicts.into_iter().max_by_key(|verdict| reached(*verdict))
+}
+
+fn reached(verdict: Verdict) -> Option<usize> {
+    ORDER.iter().position(|other| *other == verdict)
 }
 
 /// Returns the meaning of [`Verdict::ShortArc`]; without a limit in pixels, it is a part of the picture's diagonal.

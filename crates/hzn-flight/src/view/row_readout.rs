@@ -146,7 +146,11 @@ mod tests {
 
     #[test]
     fn the_sample_of_rows_is_that_of_the_picture() {
-        for (width, height) in [(640, 480), (7, 9), (1, 200), (129, 3), (255, 1), (1920, 1080)] {
+        for (width, height) in [(7, 9), (1, 200), (129, 3), (255, 1), (640, 480), (1920, 1080)] {
+            // Miri takes half an hour for the largest one.
+            if cfg!(miri) && height > 200 {
+                continue;
+            }
             let picture: Vec<u8> = (0..width * height).map(|i: usize| (i * 37 % 251) as u8).collect();
             let step = sample_step(picture.len());
             let whole: Vec<[u8; 2]> = picture.windows(2).step_by(step).map(|pair| [pair[0], pair[1]]).collect();

@@ -24,6 +24,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// Time in which size and time of a file must be the same, before its picture counts as complete: its writer may pause
 /// for half a second.
 const STILL: Duration = Duration::from_millis(500);
+/// The same for a PNG or a JPEG without its end. It is damaged, or its writer waits for a slow line.
+const STILL_WITHOUT_END: Duration = Duration::from_secs(10);
 /// Longest time between two lists of the folder. Its time changes with every new file, but two changes within one tick
 /// of the file system's clock have the same time.
 const LIST_EVERY: Duration = Duration::from_secs(1);
@@ -97,12 +99,18 @@ impl Growing {
         // A file of no bytes waits for its content. One that was removed is handed out, because a picture that a
         // program takes away unseen must have a row.
         let is_empty = state.is_some_and(|(bytes, _)| bytes == 0);
-        !is_empty && (self.since.elapsed() >= STILL || has_end(&self.path))
+        let rests = if has_known_end(&self.path) { STILL_WITHOUT_END } else { STILL };
+        !is_empty && (self.since.elapsed() >= rests || has_end(&self.path))
     }
 }
 
 fn state_of(path: &Path) -> State {
     std::fs::metadata(path).ok().map(|data| (data.len(), data.modified().ok()))
+}
+
+/// Returns whether the end of a complete picture of this kind is known.
+fn has_known_end(path: &Path) -> bool {
+    matches!(ending(path).as_str(), "png" | "jpg" | "jpeg" | "jpe")
 }
 
 /// Returns whether a file ends as a PNG or a JPEG does, so that nothing more is written to it.
@@ -234,13 +242,13 @@ mod tests {
         arrivals.look().unwrap();
         assert_eq!(names(&mut arrivals), [file("part.png")]);
         // A picture that never gets its end is handed out when it has rested; one without bytes never.
-        arrivals.growing.iter_mut().for_each(|file| file.since -= STILL);
+        arrivals.growing.iter_mut().for_each(|file| file.since -= STILL_WITHOUT_END);
         arrivals.look().unwrap();
         assert!(names(&mut arrivals).is_empty());
         std::fs::write(file("empty.png"), b"no end").unwrap();
         arrivals.look().unwrap();
         assert!(names(&mut arrivals).is_empty(), "it has just changed");
-        arrivals.growing.iter_mut().for_each(|file| file.since -= STILL);
+        arrivals.growing.iter_mut().for_each(|file| file.since -= STILL_WITHOUT_END);
         arrivals.look().unwrap();
         assert_eq!(names(&mut arrivals), [file("empty.png")]);
     }

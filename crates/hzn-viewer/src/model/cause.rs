@@ -6,6 +6,7 @@ use hzn_core::Report;
 use hzn_core::status::Status;
 use hzn_core::verdict::Verdict;
 use hzn_mcap::Row;
+use hzn_run::explain;
 
 /// Cause of the status of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,7 +22,7 @@ pub struct Cause {
 pub enum Reason {
     /// Otsu's threshold shows a limb, and the threshold in use does not.
     Level,
-    /// The verdict of the longest candidate.
+    /// The verdict of the best candidate.
     Verdict(Verdict),
 }
 
@@ -35,11 +36,6 @@ impl Reason {
     }
 }
 
-/// Returns the verdict of the longest candidate.
-pub fn longest_verdict(report: &Report<f64>) -> Option<Verdict> {
-    report.candidates.iter().max_by_key(|c| (c.length_px, std::cmp::Reverse(c.number))).map(|c| c.verdict)
-}
-
 impl Cause {
     /// Returns the cause of a result. `otsu_is_better` is true if Otsu's threshold, which is not in use, gives an
     /// answer or shows a limb of another size.
@@ -47,17 +43,16 @@ impl Cause {
         let reason = match report.status {
             Status::Ok => None,
             _ if otsu_is_better => Some(Reason::Level),
-            _ => longest_verdict(report).map(Reason::Verdict),
+            _ => explain::best_candidate(report).map(|best| Reason::Verdict(best.verdict)),
         };
         Self { status: report.status, reason }
     }
-    /// Returns the cause of a result in a file. The detail of a row lists verdicts without lengths, so the first one
-    /// counts.
+    /// Returns the cause of a result in a file. The detail of a row lists verdicts without inliers.
     pub fn from_row(row: &Row) -> Self {
-        let first = row.detail.split_once(": ").and_then(|(_, verdicts)| verdicts.split(", ").next());
-        let verdict = first.and_then(|name| Verdict::ALL.iter().find(|v| v.name() == name));
+        let names = row.detail.split_once(": ").into_iter().flat_map(|(_, verdicts)| verdicts.split(", "));
+        let verdicts = names.filter_map(|name| Verdict::ALL.iter().find(|v| v.name() == name).copied());
         let refused = row.status != Status::Ok;
-        Self { status: row.status, reason: verdict.copied().map(Reason::Verdict).filter(|_| refused) }
+        Self { status: row.status, reason: explain::best_verdict(verdicts).map(Reason::Verdict).filter(|_| refused) }
     }
     /// Returns true if this picture belongs to a group.
     pub fn is_in(&self, group: &Group) -> bool {
@@ -129,9 +124,11 @@ mod tests {
     }
 
     #[test]
-    fn a_row_of_a_file_tells_its_first_verdict() {
+    fn a_row_of_a_file_tells_the_verdict_of_its_best_edge() {
         let meta = RowMeta { index: 0, file: "a".into(), time_s: None, body: "earth".into(), altitude_km: None };
         let mut row = Row::unprocessed(&meta, Status::Rejected, "ended at gates: half-angle, short-arc");
+        assert_eq!(Cause::from_row(&row).reason, Some(Reason::Verdict(Verdict::HalfAngle)));
+        row.detail = "ended at gates in 2 looks: no-consensus, short-arc, half-angle, no-consensus".into();
         assert_eq!(Cause::from_row(&row).reason, Some(Reason::Verdict(Verdict::HalfAngle)));
         row.detail = "ended at contour".into();
         assert_eq!(Cause::from_row(&row).reason, None);

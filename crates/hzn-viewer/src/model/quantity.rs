@@ -152,6 +152,10 @@ pub fn misses_truth(row: &Row, truth: Option<&Truth>) -> bool {
 /// scatters, so that a larger one is another edge, a wrong lens, or clouds.
 const MOST_RMS: f64 = 3.0;
 
+/// A told noise below this is no expectation of an RMS, px: no camera shows the places of edges so well.
+/// `hzn calibrate noise` writes 0.001 if other keys have the whole error.
+const LEAST_TOLD_PX: f64 = 0.01;
+
 /// The RMS of residuals that is expected of an answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ExpectedRms {
@@ -164,7 +168,7 @@ pub enum ExpectedRms {
 impl ExpectedRms {
     /// Returns the told one, or else that of these results; `None` without answers.
     pub fn new<'a>(told_px: Option<f64>, rows: impl Iterator<Item = &'a Row>) -> Option<Self> {
-        if let Some(px) = told_px {
+        if let Some(px) = told_px.filter(|px| *px >= LEAST_TOLD_PX) {
             return Some(Self::Told(px));
         }
         let mut all: Vec<f64> = rows.filter_map(|row| row.rms_px.filter(|_| row.axis().is_some())).collect();
@@ -255,6 +259,7 @@ mod tests {
         assert_eq!(typical.exceeded_by(&all[0]), None);
         let told = ExpectedRms::new(Some(0.1), all.iter()).unwrap();
         assert!(told.exceeded_by(&all[1]).unwrap().contains("3.5 times the 0.10 px that sensor.toml tells"));
+        assert_eq!(ExpectedRms::new(Some(0.001), all.iter()), Some(typical), "the floor that a calibration writes");
         assert_eq!(ExpectedRms::new(None, [].iter()), None);
     }
 

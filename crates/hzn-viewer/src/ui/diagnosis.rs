@@ -199,21 +199,31 @@ impl OfSize {
     /// Draws the fitted and the expected half-angle, and what each possible cause would have to be.
     fn show(&self, viewer: &mut Viewer, ui: &mut Ui) {
         let fit = &self.fit;
-        let how = if fit.is_trial { "The limb in this picture has the half-angle" } else { "Half-angle of the answer" };
+        let how = if fit.is_trial {
+            "The limb in this picture has the half-angle"
+        } else {
+            "The best edge has the half-angle"
+        };
         let by_deg = fit.fitted_deg - fit.expected_deg;
         let [fitted, expected] = [fit.fitted_deg, fit.expected_deg];
         let half_angles = format!("{fitted:.3}°, expected is {expected:.3}°: {by_deg:+.3}°, {:+.1} σ", fit.sigmas);
-        wrapped(ui, &format!("{how} {half_angles}. These values would make them equal:"));
         let body = viewer.body;
+        let row_of = |suspect: Suspect| {
+            let all = self.plausible.iter().chain(&self.impossible).find(|c| c.suspect == suspect);
+            Some((suspect, Cause::new(suspect, fit, all, &self.config, body)?))
+        };
+        let causes: Vec<_> = in_order(&self.plausible, &self.impossible).into_iter().filter_map(row_of).collect();
+        if causes.is_empty() {
+            return wrapped(ui, &format!("{how} {half_angles}. No single value within its limits makes them equal."));
+        }
+        wrapped(ui, &format!("{how} {half_angles}. These values would make them equal:"));
         let (mut chosen, mut shift_km) = (None, None);
         egui::Grid::new("causes").num_columns(5).spacing(vec2(8.0, 3.0)).show(ui, |ui| {
             for head in ["", "now", "this picture", "all pictures", ""] {
                 ui.weak(RichText::new(head).size(11.5));
             }
             ui.end_row();
-            for suspect in in_order(&self.plausible, &self.impossible) {
-                let all = self.plausible.iter().chain(&self.impossible).find(|c| c.suspect == suspect);
-                let Some(cause) = Cause::new(suspect, fit, all, &self.config, body) else { continue };
+            for (suspect, cause) in causes {
                 for text in [suspect.name().to_owned(), cause.now.clone(), cause.here.clone()] {
                     ui.label(RichText::new(text).size(12.0));
                 }

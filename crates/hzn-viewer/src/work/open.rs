@@ -42,6 +42,11 @@ pub struct Request {
     pub follow: bool,
 }
 
+/// Returns the first input that is not there. A pattern and the line of a flight computer are no files.
+pub fn missing(inputs: &[PathBuf]) -> Option<&PathBuf> {
+    inputs.iter().find(|input| !input.exists() && !input.to_string_lossy().contains(['*', '?', '[', ':']))
+}
+
 /// A sensor.toml.
 #[derive(Debug, Clone)]
 pub struct SensorText {
@@ -222,7 +227,8 @@ fn complete_sensor(opened: &mut Opened, source: &mut dyn Source, frames: Option<
     let Some(sensor) = &mut opened.sensor else { return };
     // The session reports errors of the sensor.toml.
     let Ok(mut parsed) = hzn_files::sensor::parse(&sensor.text, &sensor.home) else { return };
-    opened.notes.extend(parsed.warnings.iter().map(ToString::to_string));
+    let doubts = frames.map(|frames| frames.check_sensor(&parsed.config)).unwrap_or_default();
+    opened.notes.extend(parsed.warnings.iter().chain(&doubts).map(ToString::to_string));
     match open::complete(source, &mut parsed) {
         Ok(notes) => opened.notes.extend(notes),
         Err(why) => opened.notes.push(why.to_string()),

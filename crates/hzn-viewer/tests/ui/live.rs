@@ -291,6 +291,20 @@ fn arrive(from: &Path, folder: &Path, name: &str) {
 }
 
 #[test]
+fn an_empty_folder_that_is_followed_is_waited_for() {
+    let (dir, pictures) = folder();
+    let inbox = dir.path().join("inbox");
+    std::fs::create_dir(&inbox).unwrap();
+    std::fs::copy(pictures.join("sensor.toml"), inbox.join("sensor.toml")).unwrap();
+    let mut window = window_that_follows(&inbox);
+    window.run_steps(3);
+    assert!(window.query_by_label_contains("Waiting for the first picture in ").is_some());
+    let first = files(&pictures).into_iter().find(|name| name.ends_with(".png")).unwrap();
+    arrive(&pictures.join(&first), &inbox, &first);
+    until(&mut window, "the first picture is not there", |v| v.sequence().len() == 1 && v.is_settled());
+}
+
+#[test]
 fn pictures_are_shown_as_they_arrive() {
     let (dir, pictures) = folder();
     let stock = dir.path().join("stock");

@@ -115,8 +115,11 @@ fn a_sensor_of_other_pictures_gives_way_to_a_new_one() {
     open(&mut window, &own);
     settled(&mut window);
     open_and_wait(&mut window, &bare);
-    // Changes of the old sensor are not lost without a question.
+    // Changes of the old sensor are not lost without a question. A mistyped name is told before it.
     scale_to(&mut window, 1.2);
+    open(&mut window, &bare.join("none"));
+    said(&mut window, "no such file or folder");
+    assert!(!shows(&window, "Unsaved changes") && window.state().session().is_some_and(|s| s.is_changed()));
     click(&mut window, "Make a new one");
     assert!(shows(&window, "Unsaved changes"));
     click(&mut window, "Discard changes");

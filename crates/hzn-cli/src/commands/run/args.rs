@@ -65,8 +65,9 @@ pub(crate) struct Args {
     /// Move the outlines in the masks farther outwards by this angle
     #[arg(long, value_name = "DEG", default_value = "0", requires = "mask_pictures", value_parser = margin_deg)]
     pub(super) mask_margin_deg: f64,
-    /// After the pictures of the folder, wait for those that arrive in it, until Ctrl-C. A picture is complete when its
-    /// file has not changed for half a second; a file that gets its name when it is complete is always safe
+    /// After the pictures of the folder, wait for those that arrive in it, until Ctrl-C. A PNG or JPEG is complete with
+    /// its end, or when it has not changed for ten seconds, and any other picture when it has not changed for half a
+    /// second; a file that gets its name when it is complete is always safe
     #[arg(long)]
     pub(super) watch: bool,
     /// Number of threads; without it, all cores

@@ -35,7 +35,10 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) -> Rect {
         let ground = if ui.visuals().dark_mode { ui.visuals().extreme_bg_color } else { Color32::from_gray(214) };
         ui.painter().rect_filled(rect, 0, ground);
         if viewer.sequence.title.is_empty() {
-            return welcome::show(viewer, ui);
+            return match viewer.awaited() {
+                Some(words) => drop(ui.centered_and_justified(|ui| ui.weak(words))),
+                None => welcome::show(viewer, ui),
+            };
         }
         let Some(frame_view) = viewer.frame_view.clone() else {
             ui.centered_and_justified(|ui| ui.weak(if viewer.sequence.is_empty() { "" } else { "…" }));

@@ -29,6 +29,12 @@ impl Viewer {
         self.follow.is_open && self.follow.jumps
     }
 
+    /// Returns what an empty window waits for: the first picture of a folder that it follows.
+    pub(in crate::ui) fn awaited(&self) -> Option<String> {
+        let folder = self.request.inputs.first().filter(|_| self.request.follow && self.opening.is_some())?;
+        Some(format!("Waiting for the first picture in {}…", folder.display()))
+    }
+
     /// Follows the sequence, or stops to.
     pub(in crate::ui) fn toggle_follow(&mut self) {
         if self.follow.is_open {

@@ -263,6 +263,10 @@ impl Viewer {
 
     /// Opens files or a folder. The pictures per second of the command line still apply; all else is the default.
     pub(super) fn open_paths(&mut self, inputs: Vec<PathBuf>) {
+        // Whoever mistypes a name keeps what is open, and is not asked about changes.
+        if let Some(missing) = open::missing(&inputs) {
+            return self.add_problem(format!("{}: no such file or folder", missing.display()));
+        }
         // A sensor.toml applies to the pictures that are open.
         if let [one] = inputs.as_slice()
             && one.extension().is_some_and(|e| e == "toml")
