@@ -1,14 +1,11 @@
 //! Each head against the solution of the others.
 
-use super::head::Head;
+use super::head::{Head, MOST_HEADS};
 use super::joint::{Cone, Joint, NoJoint, axis_sigma, chosen, invert, without_cosine};
 use crate::base::error::{ConfigError, Limit};
 use crate::base::linalg::M3;
 use crate::base::real::Real;
 use crate::geometry::frames::{Cov3, UnitVec3};
-
-/// Largest number of heads.
-pub const MOST_HEADS: usize = 4;
 
 /// Smallest and largest probability of the configuration.
 const LEAST: f64 = 1e-12;

@@ -17,8 +17,8 @@
 
 use core::f64::consts::{FRAC_PI_2, TAU};
 
-use super::check::MOST_HEADS;
 use super::glimpse::{Glimpse, PLACES};
+use super::head::MOST_HEADS;
 use super::mount::Mount;
 use crate::base::linalg::{V3, unit};
 use crate::base::real::Real;

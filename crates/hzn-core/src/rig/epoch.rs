@@ -1,7 +1,7 @@
 //! The answers of the heads at one epoch, joined in the axes of the vehicle.
 
-use super::check::{MOST_HEADS, Rig};
-use super::head::{Head, symmetric, upper};
+use super::check::Rig;
+use super::head::{Head, MOST_HEADS, symmetric, upper};
 use super::joint::{Joint, NoJoint};
 use super::mount::Mount;
 use super::weather::Limb;

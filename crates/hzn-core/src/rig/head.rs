@@ -1,10 +1,12 @@
 //! What one head saw.
 
-use super::check::MOST_HEADS;
 use crate::base::linalg::{M3, V3, basis, invert_spd3};
 use crate::base::real::Real;
 use crate::geometry::frames::{Cam, Cov3, Rotation, UnitVec3, Vehicle};
 use crate::model::report::Free;
+
+/// Largest number of heads.
+pub const MOST_HEADS: usize = 4;
 
 /// The freely fitted cone of one head in the axes of the vehicle, with its information. It is made from the answer of
 /// the head's sensor ([`Free`]) and the head's mount.

@@ -2,8 +2,7 @@
 
 use core::fmt;
 
-use super::check::MOST_HEADS;
-use super::head::Head;
+use super::head::{Head, MOST_HEADS};
 use crate::base::linalg::{M3, V3, basis, invert_spd3, unit};
 use crate::base::real::Real;
 use crate::geometry::frames::{Cov3, UnitVec3, Vehicle};

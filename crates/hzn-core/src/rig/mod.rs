@@ -74,11 +74,11 @@ mod mount;
 mod unanswered;
 mod weather;
 
-pub use check::{Config, MOST_HEADS, Rig};
+pub use check::{Config, Rig};
 pub use coarse::{Coarse, GlimpsedHead, Light, coarse};
 pub use epoch::{Answered, Common, Epoch, EpochAnswer};
 pub use glimpse::Glimpse;
-pub use head::Head;
+pub use head::{Head, MOST_HEADS};
 pub use joint::{Joint, NoJoint};
 pub use mount::Mount;
 pub use unanswered::Unanswered;

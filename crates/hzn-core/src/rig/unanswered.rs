@@ -24,7 +24,7 @@ const AZIMUTHS: i32 = 90;
 /// refuse many limbs.
 const FEWEST: i32 = 5;
 
-/// What a head without an answer leaves of the odds. Of the epochs of two visible heads, with clouds and the Sun and its
+/// What a head without an answer leaves of the odds. Of the epochs of two visible heads, with clouds, the Sun and its
 /// ghosts in view, 9 % have a head without an answer (`pair` in the guide to several heads). Without a limb, nearly all
 /// pictures have no answer.
 const LEFT: f64 = 0.1;

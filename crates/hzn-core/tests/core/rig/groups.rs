@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::*;
 
-/// Draws one epoch of heads in groups, in which head 0 is turned by `turned_rad`. Each group has a half-angle of its own,
-/// drawn from a wide range.
+/// Draws one epoch of heads in groups, in which head 0 is turned by `turned_rad`. Each group has a half-angle of its
+/// own, drawn from a wide range.
 fn epoch_of_groups(
     cameras: &[Camera],
     groups: &[u8],
