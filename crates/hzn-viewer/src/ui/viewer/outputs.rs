@@ -230,11 +230,16 @@ mod tests {
 
     #[test]
     fn what_is_picked_is_opened_and_a_name_to_write_is_looked_at_first() {
-        let picked = PathBuf::from("/picked/flight.mcap");
+        let dir = tempfile::tempdir().unwrap();
+        let picked = dir.path().join("flight.mcap");
+        std::fs::write(&picked, "").unwrap();
         let opened = browsed(Purpose::Open, Some(picked.clone()));
         assert!(opened.path_dialog.is_none() && opened.settings.recent == [picked.clone()]);
+        let absent = browsed(Purpose::Open, Some(dir.path().join("absent")));
+        assert!(absent.path_dialog.is_none() && absent.settings.recent.is_empty());
         let named = browsed(Purpose::Table, Some(picked.clone()));
-        assert!(named.path_dialog.is_some_and(|a| a.text == "/picked/flight.mcap" && a.browsing.is_none()));
+        let text = picked.display().to_string();
+        assert!(named.path_dialog.is_some_and(|a| a.text == text && a.browsing.is_none()));
         let left = browsed(Purpose::Open, None);
         assert!(left.path_dialog.is_some_and(|a| a.text == "/typed") && left.settings.recent.is_empty());
     }
