@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use hzn_core::frames::{Cam, UnitVec3};
+use hzn_core::frames::{Cam, UnitVec3, Vehicle};
 use hzn_core::rig::{GlimpsedHead, Light, Mount, coarse};
 use hzn_core::status::Status;
 use hzn_core::{Expected, Prior, Sensor, threshold};
@@ -35,27 +35,37 @@ pub(super) fn set(row: &mut Row, sensors: &[Sensor<f64>], mounts: &[Mount<f64>],
         return;
     }
     let all = || sensors.iter().zip(mounts).zip(heads);
-    let glimpsed = all().filter_map(|((sensor, mount), head)| {
+    // Heads of another band see the body in another light, so they have no part.
+    let light = if body.is_seen_in_sunlight() { Light::Sun(sun(sensors, mounts, heads)) } else { Light::Own };
+    let is_of_band = |sensor: &Sensor<f64>| is_sunlit(sensor) == body.is_seen_in_sunlight();
+    let glimpsed = all().filter(|((sensor, _), _)| is_of_band(sensor)).filter_map(|((sensor, mount), head)| {
         let glimpse = head.frame.filter(|_| head.repeats.is_none())?.glimpse.as_ref()?;
         let level = level_of(sensor.config().threshold_of(0), head.level, glimpse.full_scale());
         Some(GlimpsedHead { glimpse, level, camera: sensor.camera(), mount })
     });
     let half_angle = all().find_map(|((sensor, _), head)| half_angles(sensor, head));
-    if let Some(coarse) = coarse(glimpsed, half_angle, &light(sensors, mounts, heads)) {
+    if let Some(coarse) = coarse(glimpsed, half_angle, &light) {
         [row.coarse_x, row.coarse_y, row.coarse_z] = coarse.axis.xyz().map(Some);
         row.coarse_sigma_deg = Some(coarse.sigma_rad.to_degrees());
     }
 }
 
-/// Returns the light in which the heads see their first body.
-pub(super) fn light(sensors: &[Sensor<f64>], mounts: &[Mount<f64>], heads: &[Seen<'_>]) -> Light<f64> {
-    let body = sensors.first().and_then(|sensor| sensor.config().each_body().first());
-    let Some(body) = body.filter(|body| body.is_seen_in_sunlight()) else { return Light::Own };
-    let of_head = |(mount, head): (&Mount<f64>, &Seen<'_>)| {
+/// Returns whether a head sees its first body in sunlight.
+pub(super) fn is_sunlit(sensor: &Sensor<f64>) -> bool {
+    sensor.config().each_body().first().is_some_and(|body| body.is_seen_in_sunlight())
+}
+
+/// Returns the direction to the Sun in the axes of the vehicle, if a head knows it.
+pub(super) fn sun(
+    sensors: &[Sensor<f64>],
+    mounts: &[Mount<f64>],
+    heads: &[Seen<'_>],
+) -> Option<UnitVec3<Vehicle, f64>> {
+    sensors.iter().zip(mounts).zip(heads).find_map(|((sensor, mount), head)| {
+        let body = sensor.config().each_body().first()?;
         let sun: UnitVec3<Cam, f64> = engine::prior(head.frame?.data.as_ref(), 0, body).ok()?.sun?;
         Some(mount.after(0.0, None)?.apply(&sun))
-    };
-    Light::Sun(mounts.iter().zip(heads).find_map(of_head))
+    })
 }
 
 /// Returns the limits of the half-angle of the first body in the picture of a head, radians; `None` if nothing is known

@@ -4,7 +4,7 @@ use hzn_core::body;
 use hzn_core::fit::HalfAngle;
 use hzn_core::frames::{Cov3, UnitVec3, Vehicle};
 use hzn_core::report::Free;
-use hzn_core::rig::{Answered, Common, EpochAnswer, Limb, Mount, NoJoint, Rig, Unanswered};
+use hzn_core::rig::{Answered, Common, EpochAnswer, Light, Limb, Mount, NoJoint, Rig, Unanswered};
 use hzn_core::status::Status;
 use hzn_core::{Config, Sensor};
 use hzn_files::rig::{self, JOINT};
@@ -127,9 +127,10 @@ impl Joiner {
         let time_s = epoch.time_s.zip(start_s).map(|(after_s, start_s)| start_s + after_s).or(start_s);
         let mut row = match epoch.answer {
             Ok(answer) => {
-                let answer =
-                    answer.doubted_by(self.unanswered(heads), &coarse::light(&self.sensors, &self.mounts, heads));
-                self.answer(index, heads, time_s, &answer)
+                // Heads of two bands see the body in two lights.
+                let sun = Light::Sun(coarse::sun(&self.sensors, &self.mounts, heads));
+                let answer = answer.doubted_by(self.unanswered(heads, false), &Light::Own);
+                self.answer(index, heads, time_s, &answer.doubted_by(self.unanswered(heads, true), &sun))
             }
             Err(NoJoint::NoHead) => self.nothing(index, heads, time_s),
             Err(why) => {
@@ -168,10 +169,12 @@ impl Joiner {
         })
     }
 
-    /// Returns the heads that have a picture of their own without an answer.
-    fn unanswered<'a>(&'a self, heads: &'a [Seen<'_>]) -> impl Iterator<Item = Unanswered<'a, f64>> {
+    /// Returns the heads that have a picture of their own without an answer: those that see their body in sunlight, or
+    /// the others.
+    fn unanswered<'a>(&'a self, heads: &'a [Seen<'_>], in_sunlight: bool) -> impl Iterator<Item = Unanswered<'a, f64>> {
         let all = self.sensors.iter().zip(&self.mounts).zip(heads);
-        let without = all.filter(|(_, head)| head.has_no_limb());
+        let of_light = all.filter(move |((sensor, _), _)| coarse::is_sunlit(sensor) == in_sunlight);
+        let without = of_light.filter(|(_, head)| head.has_no_limb());
         without.map(|((sensor, mount), _)| Unanswered { camera: sensor.camera(), region: sensor.region(), mount })
     }
 

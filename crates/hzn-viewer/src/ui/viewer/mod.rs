@@ -263,7 +263,7 @@ impl Viewer {
 
     /// Opens files or a folder. The pictures per second of the command line still apply; all else is the default.
     pub(super) fn open_paths(&mut self, inputs: Vec<PathBuf>) {
-        // After a wrong name, what was open stays. There is nothing to ask about changes.
+        // A wrong name changes nothing, so there is no question about changes.
         if let Some(missing) = open::missing(&inputs) {
             return self.add_problem(format!("{}: no such file or folder", missing.display()));
         }
