@@ -2,6 +2,7 @@
 
     python rig_campaign.py --hzn target/release/hzn --flights 20 --first-seed 100 accuracy
     python rig_campaign.py --hzn target/release/hzn --flights 20 --first-seed 100 faults
+    python rig_campaign.py --hzn target/release/hzn --flights 20 --first-seed 100 second
     python rig_campaign.py --hzn target/release/hzn --flights 20 --first-seed 100 pair
     python rig_campaign.py --hzn target/release/hzn --flights 20 --first-seed 100 radial
     python rig_campaign.py --hzn target/release/hzn --flights 10 --frames 100 coarse
@@ -11,7 +12,8 @@ The sensors of the scene `ring` are told a limb height of 15 +- 10 km while the 
 latitude is told or not. The mounts are exact, unless a fault turns one of them.
 
 `faults` turns told mounts, and changes the pictures of one head: repeated ones, those of another epoch, ghosts of the
-limb, ground without a limb. It needs opencv-python-headless.
+limb, ground without a limb. `second` counts the edges of pictures with a ghost, and what a second look at a higher
+threshold would find. Both need opencv-python-headless.
 
 `radial` tells positions that are 300 km too high or too low, with a sigma of 300 km, and none at all.
 
@@ -266,7 +268,7 @@ def merge(results):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["accuracy", "faults", "pair", "radial", "coarse", "mounts"])
+    parser.add_argument("what", choices=["accuracy", "faults", "second", "pair", "radial", "coarse", "mounts"])
     parser.add_argument("--hzn", default="target/release/hzn")
     parser.add_argument("--flights", type=int, default=10)
     parser.add_argument("--first-seed", type=int, default=100)
@@ -278,6 +280,13 @@ def main():
         results = fly(args, work)
         print(f"{args.flights} flights of {args.frames} epochs, seeds from {args.first_seed}\n")
         show(results)
+        return
+    if args.what == "second":
+        import rig_faults
+
+        results = fly(args, rig_faults.second_looks_of)
+        print(f"{args.flights} flights of {args.frames} epochs, seeds from {args.first_seed}\n")
+        rig_faults.print_second_looks(results)
         return
     if args.what == "faults":
         import rig_faults

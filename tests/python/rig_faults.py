@@ -1,12 +1,15 @@
 """Faults of the heads of a rig: what `rig_campaign.py faults` does to told mounts and to pictures."""
 
+import csv
 import math
+import re
 import shutil
 
 import cv2
 import numpy as np
 
-from rig_flights import HEADS, Count, by_time, run, simulate, tell_limb, told_mount, truths, turned, write_rig
+from rig_flights import (HEADS, Count, by_time, hzn, miss, run, simulate, tell_limb, told_mount, truths, turned,
+                         write_rig)
 
 SETS = {"four": HEADS, "three": HEADS[:3], "two opposite": ["front", "back"], "two adjacent": ["front", "right"]}
 # The axis of the camera that a wrong mount turns about.
@@ -141,3 +144,77 @@ def faults_of(program, root, seed, frames):
         fly((name, 0.0, "four"), HEADS, heads)
     shutil.rmtree(folder)
     return tallies
+
+
+# Angles between the limb and the ghosts of `second_looks_of`.
+SECOND_DEG = [1.0, 3.0]
+
+
+def answer_of(program, folder, sensor, picture):
+    """Returns the row of a picture, the number of its edges, and the work that it took."""
+    out = folder / "one.csv"
+    table = folder / "one-frames.csv"
+    with (folder / "frames.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    with table.open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(row for row in rows if row["file"] == picture.name)
+    hzn(program, "run", picture, "--sensor", sensor, "--frames", table, "-o", out, "--force", "-q", "-j", 1)
+    with out.open() as file:
+        row = next(csv.DictReader(file))
+    text = hzn(program, "explain", picture, "--sensor", sensor, "--frames", table)
+    work = re.search(r"(?m)^work +(\d+)", text)
+    return row, int(row["candidates"] or 0), int(work[1]) if work else 0
+
+
+def second_looks_of(program, root, seed, frames):
+    """Draws ghosts outside of the limb of one head. Returns for each picture: edges, whether the ghost won, whether a look
+    at a higher threshold has the limb, and the work of this look over that of the picture."""
+    folder, result = root / f"second-{seed}", []
+    simulate(program, folder, "ring", seed, frames)
+    tell_limb(folder, seed % 2 == 0)
+    head = folder / HEADS[seed % 4]
+    truth, random = truths(head), np.random.default_rng(seed)
+    # The head gets the vehicle's positions.
+    with (folder / "frames.csv").open() as file:
+        vehicle = list(csv.DictReader(file))
+    keys = [key for key in vehicle[0] if key in ("file", "time_s", "x_km", "y_km", "z_km", "utc")]
+    pictures = sorted(head.glob("*.png"))
+    with (head / "frames.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, keys)
+        writer.writeheader()
+        for row, path in zip(vehicle, pictures):
+            writer.writerow({key: row[key] for key in keys} | {"file": path.name})
+    kept = {path: read(path) for path in pictures}
+    text = (head / "sensor.toml").read_text()
+    assert "[threshold]" not in text, text
+    for size in SECOND_DEG:
+        for path, picture in kept.items():
+            axis = np.array([float(truth[path.name][f"axis_{k}"]) for k in "xy"])
+            ghost = with_ghost(picture, -axis / np.linalg.norm(axis), size, random.uniform(0.3, 0.9))
+            cv2.imwrite(str(path), ghost)
+            row, edges, work = answer_of(program, head, head / "sensor.toml", path)
+            is_ghost = row["status"] == "ok" and miss(row, truth[path.name])[0] > size / 2
+            # Otsu's threshold of the bright part.
+            bright = ghost[ghost > int(row["level"] or 0)].astype(np.float32)
+            scaled = np.clip(bright / np.iinfo(ghost.dtype).max * 255, 0, 255).astype(np.uint8)
+            level, _ = cv2.threshold(scaled.reshape(-1, 1), 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
+            counts = int(level / 255 * np.iinfo(ghost.dtype).max)
+            (head / "second.toml").write_text(text + f'\n[threshold]\nmethod = "fixed"\nlevel = {counts}\n')
+            again, _, more = answer_of(program, head, head / "second.toml", path)
+            has_limb = again["status"] == "ok" and miss(again, truth[path.name])[0] < size / 2
+            result.append((size, edges, is_ghost, has_limb, more / max(work, 1)))
+    shutil.rmtree(folder)
+    return result
+
+
+def print_second_looks(results):
+    print("| ghost, deg | pictures | with one edge | answers of the ghost | of these, a higher threshold has the limb "
+          "| work of this look, median |\n|---:|---:|---:|---:|---:|---:|")
+    rows = [row for result in results for row in result]
+    for size in SECOND_DEG:
+        own = [row for row in rows if row[0] == size]
+        ghosts = [row for row in own if row[2]]
+        print(f"| {size} | {len(own)} | {sum(row[1] == 1 for row in own)} | {len(ghosts)} | {sum(row[3] for row in ghosts)} "
+              f"| {np.median([row[4] for row in own]):.2f} |")

@@ -13,7 +13,7 @@ use hzn_sim::{FlightFrame, Scenario, ScenarioError};
 use nalgebra::{Quaternion, UnitQuaternion};
 
 use crate::error::Error;
-use crate::input::{Body, Fix, Inputs, Recording, Sample, Seen};
+use crate::input::{Body, Fix, FreeCone, Inputs, Recording, Sample, Seen};
 use crate::reference::limb_axis;
 
 /// Half-angle of the discs of Sun and Moon, rad.
@@ -30,6 +30,11 @@ pub trait Errors {
     }
     /// Returns the derivative of the measured axis by the limb height, 1/km.
     fn by_limb_height(&mut self, at: &Moment, axis: &Vector<Cam>) -> Vector<Cam>;
+    /// Returns the freely fitted cone of a limb, for a limb that is higher than the told one; `None` if the sensor has
+    /// none.
+    fn cone(&mut self, _at: &Moment, _axis: &Vector<Cam>, _higher_km: f64) -> Option<FreeCone> {
+        None
+    }
     /// Returns whether there is enough light for the body that is in view.
     fn has_light(&mut self, _at: &Moment) -> bool {
         true
@@ -135,6 +140,7 @@ fn recording(
             let (error, covariance_rad2) = errors.draw(&moment, &axis);
             let by_limb_height =
                 if body == Body::Limb { errors.by_limb_height(&moment, &axis) } else { Vector::zeros() };
+            let cone = errors.cone(&moment, &axis, limb_height_km).filter(|_| body == Body::Limb);
             seen.push(Seen {
                 time_s: known.time_s,
                 body,
@@ -145,6 +151,7 @@ fn recording(
                 altitude_km: Some(known.altitude_km),
                 by_limb_height,
                 centre: None,
+                cone,
                 row,
             });
         }

@@ -264,6 +264,14 @@ columns! {
         limb_height_est_km: Option<f64>,
         /// 1σ of that height, from the half-angle and the altitude, kilometres.
         limb_height_est_sigma_km: Option<f64>,
+        /// Covariance of the axis with the cosine of the half-angle in the fit with a free half-angle, x, rad.
+        cov_free_cos_x: Option<f64>,
+        /// Covariance of that axis with the cosine, y, rad.
+        cov_free_cos_y: Option<f64>,
+        /// Covariance of that axis with the cosine, z, rad.
+        cov_free_cos_z: Option<f64>,
+        /// Variance of the cosine of the half-angle in that fit.
+        var_free_cos: Option<f64>,
     }
 }
 
@@ -352,6 +360,10 @@ impl Row {
                 self.cov_free_yz,
                 self.cov_free_zz,
             ] = free.covariance.upper_rad2.map(number);
+            if let Some(with_cos) = free.axis_with_cos {
+                [self.cov_free_cos_x, self.cov_free_cos_y, self.cov_free_cos_z] = with_cos.map(number);
+                self.var_free_cos = number(free.var_cos);
+            }
         }
         if let Some(by) = s.axis_by_cos {
             [self.axis_by_cos_x, self.axis_by_cos_y, self.axis_by_cos_z] = by.map(number);

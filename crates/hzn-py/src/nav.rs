@@ -107,7 +107,7 @@ pub(crate) fn fuse<'py>(
     clocks: BTreeMap<String, f64>,
     tables: (Vec<String>, Option<String>),
     given: &Bound<'py, PyAny>,
-    wanted: (bool, bool),
+    wanted: (bool, bool, bool),
     rate_hz: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let settings = settings(given)?;
@@ -128,8 +128,8 @@ pub(crate) fn fuse<'py>(
         recording.clock_offset_s = *offset_s;
     }
     let read = read_tables(&mut inputs, [imu.as_ref(), gnss.as_ref(), attitude.as_ref()], &tables)?;
-    let (smoothed, solved) = wanted;
-    let wanted = Wanted { smoothed, solved, rate_hz: Some(rate_hz) };
+    let (smoothed, solved, points) = wanted;
+    let wanted = Wanted { smoothed, solved, points, rate_hz: Some(rate_hz) };
     let fused = errors::detached(py, || hzn_fuse::fuse(&inputs, &settings, wanted))?.map_err(to_exception)?;
     let states: Vec<Value> = sink::states(&fused).map(|s| to_json(&s)).collect();
     let innovations: Vec<Value> = sink::innovations(&fused).map(|i| to_json(&i)).collect();
@@ -190,6 +190,7 @@ fn solution(solved: &Solved, cameras: &[String]) -> Value {
         "steps": solved.steps,
         "is_converged": solved.is_converged,
         "cost": solved.cost,
+        "limb_share": solved.limb_share,
         "determined": solved.determined.iter().map(determined).collect::<Vec<_>>(),
         "lowered": solved.lowered.iter().map(lowered).collect::<Vec<_>>(),
         "orbit": solved.orbit.map(|orbit| json!({

@@ -99,7 +99,7 @@ fn cells(place: &Place, file: &str) -> Vec<(String, String)> {
 }
 
 #[test]
-fn rows_have_every_column_of_a_run() {
+fn rows_have_every_column_of_a_run_but_one_correlation() {
     let cases = [
         (true, &["position_x_km", "position_z_km", "pos_cov_xx_km2", "pos_cov_zz_km2"]),
         (false, &["axis_free_x", "cov_free_zz", "axis_by_cos_x", "axis_by_cos_z"]),
@@ -111,7 +111,13 @@ fn rows_have_every_column_of_a_run() {
         place.write("sent.bin", &stream.bytes);
         place.run(&["telemetry", "sent.bin", "-o", "sent.csv"]).expect(0);
         place.run(&["run", "in", "--flight", "-o", "here.csv"]).expect(0);
-        let (sent, here) = (cells(&place, "sent.csv"), cells(&place, "here.csv"));
+        let (sent, mut here) = (cells(&place, "sent.csv"), cells(&place, "here.csv"));
+        // The packets do not have the correlation of the free axis with its half-angle.
+        for (column, cell) in &mut here {
+            if column.starts_with("cov_free_cos") || column == "var_free_cos" {
+                cell.clear();
+            }
+        }
         assert_eq!(sent, here);
         // A stream from another program gives the same rows.
         let mut piped = place.command(&["telemetry", "-", "-o", "piped.csv"]);

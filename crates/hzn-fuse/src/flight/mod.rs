@@ -12,7 +12,7 @@ use crate::data::Flight;
 use crate::error::Error;
 use crate::events::{clean, events};
 use crate::finding::{Finding, Level, Verdict};
-use crate::input::{Inputs, Recording};
+use crate::input::{Body, Inputs, Recording};
 use crate::orbit;
 use crate::repeats;
 use crate::results::{Counts, Fused};
@@ -46,6 +46,8 @@ pub struct Wanted {
     pub smoothed: bool,
     /// The solution of the whole flight at once, instead of the smoothed one.
     pub solved: bool,
+    /// Solve with the freely fitted cones of the limbs ([`crate::input::FreeCone`]) instead of their axes.
+    pub points: bool,
     /// Most solutions a second; `None` for one at each sample.
     pub rate_hz: Option<f64>,
 }
@@ -64,6 +66,9 @@ impl Wanted {
 /// measurements than a smoother can keep.
 pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fused, Error> {
     wanted.check()?;
+    if wanted.points {
+        check_points(inputs)?;
+    }
     let mounts = mounts(&inputs.recordings)?;
     if inputs.imu.is_empty() {
         return without_unit(inputs, settings, &mounts, wanted);
@@ -123,13 +128,14 @@ pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fuse
 }
 
 /// Calls a function with the whole flight as a sum of squares and with its first estimates, which are the filter's:
-/// what [`Wanted::solved`] solves.
+/// what [`Wanted::solved`] solves, with `points` for [`Wanted::points`].
 ///
 /// # Errors
 /// See [`fuse`].
 pub fn with_problem<R>(
     inputs: &Inputs,
     settings: &Settings,
+    points: bool,
     call: impl FnOnce(&Problem<'_>, &Estimates) -> R,
 ) -> Result<R, Error> {
     let mounts = mounts(&inputs.recordings)?;
@@ -143,7 +149,7 @@ pub fn with_problem<R>(
     let flight = Flight { inputs, names: &names, mounts: &mounts, samples: &samples, events: &events };
     let all = estimate_all(settings);
     let ran = Runner::<MANY>::new(&flight, settings, false)?.run(Some(1.0))?;
-    let (problem, first) = Problem::new(&flight, &all, &ran.track)?;
+    let (problem, first) = Problem::new(&flight, &all, &ran.track, points)?;
     Ok(call(&problem, &first))
 }
 
@@ -169,6 +175,25 @@ fn without_unit(
         "there is no sample of an inertial unit; give --imu FILE, or --solve for the orbit of a satellite from limbs \
          and attitudes",
     ))
+}
+
+/// Refuses limbs without free cones, and flights in which nothing says how high the vehicle is.
+fn check_points(inputs: &Inputs) -> Result<(), Error> {
+    if inputs.imu.is_empty() || !inputs.has_receiver() {
+        let what =
+            "--points compares the size of the limb with the altitude, which needs an inertial unit and a receiver";
+        return Err(Error::unusable(format!("{what}; give --imu FILE and --gnss FILE, or leave --points out")));
+    }
+    let limbs = |r: &'_ Recording| r.seen.iter().filter(|s| s.body == Body::Limb).count();
+    let cones = |r: &'_ Recording| r.seen.iter().filter(|s| s.cone.is_some()).count();
+    match inputs.recordings.iter().find(|r| limbs(r) > 0 && cones(r) == 0) {
+        Some(one) => Err(Error::unusable(format!(
+            "{}: --points needs the freely fitted cone of each limb (column var_free_cos) and the sensor.toml; run `hzn \
+             run -o {0}.mcap` again, which stores both, or leave --points out",
+            one.name
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// Refuses settings that need a receiver.
@@ -198,7 +223,7 @@ fn replay<const N: usize>(flight: &Flight<'_>, settings: &Settings, wanted: Want
     let Ran { mut fused, track, .. } = Runner::<N>::new(flight, settings, false)?.run(wanted.rate_hz)?;
     if wanted.solved {
         let all = estimate_all(settings);
-        let (problem, first) = Problem::new(flight, &all, &track)?;
+        let (problem, first) = Problem::new(flight, &all, &track, wanted.points)?;
         let (epochs, solved) = solve(&problem, first)?;
         if !solved.is_converged {
             fused.notes.push(format!("--solve did not converge in {} steps", solved.steps));

@@ -2,6 +2,7 @@
 
 mod attitudes;
 mod columns;
+mod cone;
 mod fix;
 mod gnss;
 mod imu;
@@ -15,6 +16,7 @@ use hzn_nav::frames::Rotation;
 use nalgebra::Quaternion;
 
 pub use attitudes::{Attitude, attitudes};
+pub use cone::FreeCone;
 pub use fix::{Fix, Receiver};
 pub use gnss::gnss;
 pub use imu::{Sample, imu};

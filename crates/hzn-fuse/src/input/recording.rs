@@ -4,13 +4,14 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use hzn_core::status::Status;
-use hzn_core::{Config, camera};
+use hzn_core::{Config, Sensor, camera};
 use hzn_files::rig::JOINT;
 use hzn_mcap::Row;
 use hzn_nav::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_run::results::Results;
 use nalgebra::Matrix3;
 
+use super::cone::FreeCone;
 use super::mount;
 use crate::error::Error;
 
@@ -70,6 +71,8 @@ pub struct Seen {
     pub by_limb_height: Vector<Cam>,
     /// The position of the body's centre, if the recording has it.
     pub centre: Option<Centre>,
+    /// The freely fitted cone of a limb, if the recording has it and the sensor is known.
+    pub cone: Option<FreeCone>,
     /// Index of the row in the recording.
     pub row: usize,
 }
@@ -164,6 +167,7 @@ impl Recording {
             altitude_sigma_km: largest(|b| b.altitude_sigma_km).filter(|sigma_km| *sigma_km != not_told_km),
             ..Self::default()
         };
+        let sensor = config.and_then(|config| Sensor::new(config).ok());
         let mut known = HashSet::new();
         for (index, row) in rows.iter().enumerate().filter(|(_, row)| row.status == Status::Ok) {
             let body = match row.body.as_str() {
@@ -183,7 +187,7 @@ impl Recording {
                 recording.add_impossible(row, what);
                 continue;
             }
-            let Some(seen) = seen(row, index, time_s, body, limb_sigma_km) else {
+            let Some(seen) = seen(row, index, time_s, body, limb_sigma_km, sensor.as_ref()) else {
                 recording.incomplete += 1;
                 continue;
             };
@@ -221,7 +225,14 @@ fn is_earth(name: &str) -> bool {
 }
 
 /// Returns the direction of a row; `None` if a number is missing.
-fn seen(row: &Row, index: usize, time_s: f64, body: Body, limb_sigma_km: Option<f64>) -> Option<Seen> {
+fn seen(
+    row: &Row,
+    index: usize,
+    time_s: f64,
+    body: Body,
+    limb_sigma_km: Option<f64>,
+    sensor: Option<&Sensor<f64>>,
+) -> Option<Seen> {
     let axis = Vector::from(row.axis()?);
     let symmetric = |[xx, xy, xz, yy, yz, zz]: [f64; 6]| Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     let three = |x: [Option<f64>; 3]| Some(Vector::new(x[0]?, x[1]?, x[2]?));
@@ -235,10 +246,12 @@ fn seen(row: &Row, index: usize, time_s: f64, body: Body, limb_sigma_km: Option<
         altitude_km: row.altitude_km,
         by_limb_height: Vector::zeros(),
         centre: None,
+        cone: None,
         row: index,
     };
     if body == Body::Limb {
         seen.separate_limb_height(row, limb_sigma_km);
+        seen.cone = FreeCone::of_row(row, sensor);
         if let Some(position_km) = row.position_km().map(Vector::from) {
             let covariance_km2 = symmetric(row.position_covariance_km2()?);
             seen.centre = Some(Centre { position_m: position_km * 1e3, covariance_m2: (covariance_km2 * 1e6).into() });
@@ -268,6 +281,13 @@ impl Seen {
         let whole = self.covariance_rad2.into_inner();
         let slow = self.common_rad2.map_or(whole, Covariance::into_inner);
         [largest(slow), largest(whole - slow)]
+    }
+
+    /// Returns the share of the covariance whose error is the same in the next picture: 1 if the recording does not
+    /// have it.
+    pub(crate) fn slow_share(&self) -> f64 {
+        let common = self.common_rad2.map(|common| common.as_inner().trace() / self.covariance_rad2.as_inner().trace());
+        common.filter(|share| share.is_finite()).map_or(1.0, |share| share.clamp(0.0, 1.0))
     }
 
     /// Takes the error of the limb height out of the covariance, because the filter holds it as one error that all

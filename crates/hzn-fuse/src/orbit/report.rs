@@ -43,6 +43,7 @@ pub(super) fn report(case: &Case<'_>, solution: &Solution, names: &[String]) -> 
             cost: at.cost,
             determined: determined(case, solution, names, &sigma),
             lowered: lowered(solution),
+            limb_share: None,
             sources: BTreeMap::new(),
             orbit: None,
         };

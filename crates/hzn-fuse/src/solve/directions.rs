@@ -17,7 +17,7 @@ use crate::input::Centre;
 use crate::sparse::Linear;
 
 /// Smallest white noise of a direction as a share of its sigma: without any, a direction would be a condition.
-const LEAST_WHITE: f64 = 0.01;
+pub(super) const LEAST_WHITE: f64 = 0.01;
 
 /// Where and when something was seen.
 #[derive(Debug, Clone, Copy)]
@@ -103,23 +103,23 @@ impl Direction {
 }
 
 /// Returns the derivative by a knot from that by its attitude.
-fn by_knot(by_attitude: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn by_knot(by_attitude: &DMatrix<f64>) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(by_attitude.nrows(), Layout::VEHICLE);
     out.view_mut((0, Layout::ATTITUDE), by_attitude.shape()).copy_from(by_attitude);
     out
 }
 
 /// A vector as a camera sees it.
-struct Seen {
-    predicted: Vector<Cam>,
-    by_attitude: Matrix3<f64>,
-    by_mount: Matrix3<f64>,
-    by_clock: Vector3<f64>,
-    to_camera: Rotation<Fixed, Cam>,
+pub(super) struct Seen {
+    pub(super) predicted: Vector<Cam>,
+    pub(super) by_attitude: Matrix3<f64>,
+    pub(super) by_mount: Matrix3<f64>,
+    pub(super) by_clock: Vector3<f64>,
+    pub(super) to_camera: Rotation<Fixed, Cam>,
 }
 
 /// Returns a vector as a camera sees it at the time of its clock.
-fn seen(at: &At, estimates: &Estimates, turning: &Turning, vector: &Vector<Fixed>) -> Option<Seen> {
+pub(super) fn seen(at: &At, estimates: &Estimates, turning: &Turning, vector: &Vector<Fixed>) -> Option<Seen> {
     let shared = &estimates.shared;
     let (knot, mount) = (estimates.knots.get(at.knot)?, shared.mounts.get(at.camera)?);
     let time_s = at.time_s + shared.clocks_s.get(at.camera)?;

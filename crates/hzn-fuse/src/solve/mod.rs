@@ -7,6 +7,7 @@
 mod adjust;
 mod begin;
 mod carried;
+mod cones;
 mod directions;
 mod estimates;
 mod knots;

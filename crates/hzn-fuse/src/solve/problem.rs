@@ -12,6 +12,7 @@ use nalgebra::{DVector, Matrix3};
 
 use super::begin::{first_estimates, shared};
 use super::carried::{Carrier, errors_of_unit};
+use super::cones::{Cone, Told};
 use super::directions::{At, CentreSeen, Direction};
 use super::estimates::{Estimates, column};
 use super::knots::Knot;
@@ -59,6 +60,7 @@ pub struct Weighed {
 #[derive(Debug, Clone)]
 enum Measured {
     Direction(Direction),
+    Cone(Box<Cone>),
     Centre(CentreSeen),
     Fix { knot: usize, index: usize },
     Attitude { knot: usize, index: usize },
@@ -69,6 +71,8 @@ enum Measured {
 pub struct Problem<'a> {
     flight: Flight<'a>,
     settings: &'a Settings,
+    /// Whether limbs count with their freely fitted cones instead of their axes.
+    points: bool,
     cameras: Vec<CameraOptions>,
     layout: Layout,
     sigmas: DVector<f64>,
@@ -81,7 +85,13 @@ pub struct Problem<'a> {
 
 impl<'a> Problem<'a> {
     /// Makes the problem, and its first estimates from the filter's.
-    pub(crate) fn new(flight: &Flight<'a>, settings: &'a Settings, track: &Track) -> Result<(Self, Estimates), Error> {
+    /// With `points`, limbs count with their freely fitted cones.
+    pub(crate) fn new(
+        flight: &Flight<'a>,
+        settings: &'a Settings,
+        track: &Track,
+        points: bool,
+    ) -> Result<(Self, Estimates), Error> {
         let mut cameras = flight.cameras(settings);
         let mut options = flight.options(settings, hzn_nav::options::StartSigmas::default());
         let slow: Vec<Option<f64>> =
@@ -100,6 +110,7 @@ impl<'a> Problem<'a> {
         let mut problem = Self {
             flight: *flight,
             settings,
+            points,
             cameras,
             layout,
             sigmas,
@@ -165,18 +176,25 @@ impl<'a> Problem<'a> {
             return None;
         }
         let by_position = || limb_axis(seen.body, &state.position_m).filter(|_| self.flight.inputs.has_receiver());
+        let reference = seen.reference.or_else(by_position)?;
+        let role = Role::Measured(at.time_s, Some(at.camera), Kind::Direction(seen.body));
+        if let Some((cone, altitude_km)) = seen.cone.zip(seen.altitude_km).filter(|_| self.points) {
+            let told = Told { reference, altitude_km, slow_share: seen.slow_share() };
+            let cone = Cone::new(at, &cone, told, state, white_rad, slow)?;
+            self.measured.push((role, Measured::Cone(Box::new(cone))));
+            return Some(seen.body);
+        }
         let measurement = DirectionMeasurement {
             camera: at.camera,
             body: 0,
             measured: seen.axis,
-            reference: seen.reference.or_else(by_position)?,
+            reference,
             covariance_rad2: seen.covariance_rad2,
             common_rad2: seen.common_rad2,
             by_limb_height: seen.by_limb_height,
             is_limb: seen.body == Body::Limb,
         };
         let direction = Direction::new(at, &measurement, &state.position_m, white_rad, slow).ok()?;
-        let role = Role::Measured(at.time_s, Some(at.camera), Kind::Direction(seen.body));
         self.measured.push((role, Measured::Direction(direction)));
         Some(seen.body)
     }
@@ -189,6 +207,18 @@ impl<'a> Problem<'a> {
     /// Returns what was known of the shared errors before: 1-sigma of each.
     pub fn known(&self) -> &DVector<f64> {
         &self.sigmas
+    }
+
+    /// Returns the share of the limb height's prior sigma in the variance of the limbs' directions; `None` if the limb
+    /// height is known, or if there are no limbs.
+    pub(super) fn limb_share_of_directions(&self) -> Option<f64> {
+        let sigma_km = self.sigmas.get(column(self.layout.limb_height?))?;
+        let seen = self.flight.inputs.recordings.iter().flat_map(|r| &r.seen).filter(|s| s.body == Body::Limb);
+        let (by_limb, rest) = seen.fold((0.0, 0.0), |(by_limb, rest), s| {
+            let height = s.by_limb_height.norm_squared() * sigma_km * sigma_km;
+            (by_limb + height, rest + s.covariance_rad2.as_inner().trace())
+        });
+        (rest > 0.0).then(|| by_limb / (by_limb + rest))
     }
 
     /// Returns the mounts that were told.
@@ -237,6 +267,7 @@ impl<'a> Problem<'a> {
     fn measured_error(&self, estimates: &Estimates, role: Role, measured: &Measured) -> Option<Linear> {
         match measured {
             Measured::Direction(direction) => direction.error(estimates, &self.layout, &self.turning),
+            Measured::Cone(cone) => cone.error(estimates, &self.layout, &self.turning),
             Measured::Centre(centre) => centre.error(estimates, &self.layout, &self.turning),
             Measured::Fix { knot, index } => {
                 let (fix, state) = (self.flight.inputs.gnss.get(*index)?, estimates.knots.get(*knot)?);

@@ -22,11 +22,16 @@ pub(super) fn report(
     let shared_block = estimates.shared_block();
     let shared = marginals.block(shared_block, shared_block).ok_or_else(missing)?;
     let mut epochs = Vec::with_capacity(estimates.knots.len());
+    let limb = LimbShare::new(problem.layout(), &shared);
+    let (mut by_limb, mut total) = (0.0, 0.0);
     for knot in 0..estimates.knots.len() {
         let own = marginals.block(knot, knot).ok_or_else(missing)?;
         let cross = marginals.block(knot, shared_block).ok_or_else(missing)?;
+        by_limb += limb.as_ref().map_or(0.0, |limb| limb.variance(&cross));
+        total += own.view((Layout::ATTITUDE, Layout::ATTITUDE), (3, 3)).trace();
         epochs.extend(epoch(problem, estimates, knot, &Known { own, cross, shared: &shared }));
     }
+    solved.limb_share = limb.and(problem.limb_share_of_directions()).map(|share| [share, by_limb / total]);
     solved.determined = determined(problem, estimates, &shared);
     let lowered = errors.iter().filter(|e| e.weight < 1.0).filter_map(|e| match e.role {
         Role::Model => None,
@@ -42,6 +47,29 @@ pub(super) fn report(
         }
     }
     Ok(epochs)
+}
+
+/// The errors of the limb height, and of its change with the latitude.
+struct LimbShare {
+    columns: Vec<usize>,
+    /// The inverse of their covariance.
+    information: DMatrix<f64>,
+}
+
+impl LimbShare {
+    fn new(layout: &Layout, shared: &DMatrix<f64>) -> Option<Self> {
+        let places = [layout.limb_height, layout.limb_latitude].into_iter().flatten();
+        let columns: Vec<usize> = places.flat_map(|place| column(place)..column(place) + place.len).collect();
+        let covariance = shared.select_rows(&columns).select_columns(&columns);
+        let information = covariance.cholesky()?.inverse();
+        (!columns.is_empty()).then_some(Self { columns, information })
+    }
+
+    /// Returns the part of the attitude's variance that is gone when these errors are known, rad².
+    fn variance(&self, cross: &DMatrix<f64>) -> f64 {
+        let with = cross.view((Layout::ATTITUDE, 0), (3, cross.ncols())).select_columns(&self.columns);
+        (&with * &self.information * with.transpose()).trace()
+    }
 }
 
 /// Covariances of a knot, of it with the shared errors, and of these.

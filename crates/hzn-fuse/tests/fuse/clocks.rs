@@ -50,6 +50,7 @@ fn seen(row: usize) -> Seen {
         altitude_km: Some(geodetic(position_m.xyz(), WGS84_A_M, WGS84_B_M).0 * 1e-3),
         by_limb_height: Vector::zeros(),
         centre: None,
+        cone: None,
         row,
     }
 }

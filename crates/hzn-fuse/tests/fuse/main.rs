@@ -5,6 +5,7 @@ mod common;
 mod common_part;
 mod flight;
 mod orbit;
+mod points;
 mod recordings;
 mod repeats;
 mod solve;

@@ -168,6 +168,7 @@ fn simulate(plan: Plan) -> (Inputs, Vec<Place>) {
             altitude_km: Some((position_m.norm() - 6_371e3) / 1e3 + three(5.0).x),
             by_limb_height: by_height.into(),
             centre: None,
+            cone: None,
             row: number,
         });
         let told = UnitQuaternion::from_scaled_axis(three(TRACKER)) * attitude;

@@ -84,7 +84,7 @@ fn drawn(seed: u64) -> (Scenario, Inputs) {
 }
 
 /// The settings of the scene: smaller shares for vibration and delays, which a simulated flight does not have.
-fn own() -> Settings {
+pub(crate) fn own() -> Settings {
     let mut own = Settings::default();
     own.imu.gyro_noise_deg_rth[1] = 0.6;
     own.imu.accel_noise_mg_rthz[1] = 0.5;
@@ -103,13 +103,13 @@ fn derivatives_are_those_of_differences() {
     inputs.imu.retain(|s| s.imu.time_s < 150.0);
     let mut settings = own();
     settings.limb_height.latitude_sigma_km = 2.0;
-    let worst = with_problem(&inputs, &settings, differences).unwrap();
+    let worst = with_problem(&inputs, &settings, false, differences).unwrap();
     // The prior of a mount neglects that its axes turn by half of its error, here 0.3°: the largest difference.
     assert!(worst < 6e-3, "{worst}");
 }
 
 /// Returns the largest difference of a derivative over the size of the derivatives of its error and block.
-fn differences(problem: &Problem<'_>, first: &Estimates) -> f64 {
+pub(crate) fn differences(problem: &Problem<'_>, first: &Estimates) -> f64 {
     let layout = problem.layout();
     let mut draws = Draws(7);
     let sizes = first.sizes(layout);
@@ -153,7 +153,7 @@ fn differences(problem: &Problem<'_>, first: &Estimates) -> f64 {
 }
 
 /// The error of a solution and its sigmas about each axis at a time, degrees, and its NEES.
-fn at_time(epochs: &[Epoch], scene: &Scenario, time_s: f64) -> Option<([f64; 3], [f64; 3], f64)> {
+pub(crate) fn at_time(epochs: &[Epoch], scene: &Scenario, time_s: f64) -> Option<([f64; 3], [f64; 3], f64)> {
     let rows: Vec<_> = scene.path().unwrap().vehicle_rows([0.0, 430.0], 20.0).collect();
     let epoch =
         epochs.iter().min_by(|a, b| (a.state.time_s - time_s).abs().total_cmp(&(b.state.time_s - time_s).abs()))?;
@@ -168,21 +168,25 @@ fn flights() -> usize {
 
 /// Root mean square over flights and axes.
 #[derive(Default)]
-struct Table {
-    filter: Vec<f64>,
-    solve: Vec<f64>,
-    bound: Vec<f64>,
-    nees: Vec<f64>,
+pub(crate) struct Table {
+    pub(crate) filter: Vec<f64>,
+    pub(crate) solve: Vec<f64>,
+    pub(crate) bound: Vec<f64>,
+    pub(crate) nees: Vec<f64>,
     levels: [usize; 3],
     longest_s: f64,
 }
 
-fn rms(all: &[f64]) -> f64 {
+pub(crate) fn rms(all: &[f64]) -> f64 {
     (all.iter().map(|x| x * x).sum::<f64>() / all.len() as f64).sqrt()
 }
 
 impl Table {
-    fn add(&mut self, scene: &Scenario, fused: &Fused) {
+    pub(crate) fn len(&self) -> usize {
+        self.nees.len()
+    }
+
+    pub(crate) fn add(&mut self, scene: &Scenario, fused: &Fused) {
         let (Some(filter), Some(solve)) =
             (at_time(&fused.epochs, scene, TIME_S), at_time(&fused.smoothed, scene, TIME_S))
         else {
@@ -195,7 +199,7 @@ impl Table {
         self.levels[fused.verdict.level() as usize] += 1;
     }
 
-    fn print(&self, name: &str) {
+    pub(crate) fn print(&self, name: &str) {
         let nees = self.nees.iter().sum::<f64>() / self.nees.len() as f64;
         println!(
             "{name}: {} flights, T+{TIME_S} s: filter {:.3} deg, solve {:.3} deg RMS per axis, bound {:.3}, NEES \
@@ -386,7 +390,7 @@ fn what_was_determined_is_told() {
     assert!(share("clock of left") < 0.7 && share("mount of left") < 0.4, "{:?}", solved.determined);
     assert!(share("accel bias") < 0.05 && share("accel scale") > 0.99 && share("gyro axes") > 0.9);
     assert!(solved.sources.keys().any(|(camera, kind)| camera.is_none() && *kind == Kind::Velocity));
-    let model = with_problem(&inputs, &own(), |problem, first| {
+    let model = with_problem(&inputs, &own(), false, |problem, first| {
         problem.errors(first, Loss::Bounded).unwrap().iter().filter(|e| e.role == Role::Model).count()
     });
     assert!(model.unwrap() > solved.knots);

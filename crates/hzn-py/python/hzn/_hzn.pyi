@@ -1493,7 +1493,7 @@ def _fuse_flight(
     clocks: dict[str, float],
     tables: tuple[list[str], str | None],
     given: dict[str, Any],
-    wanted: tuple[bool, bool],
+    wanted: tuple[bool, bool, bool],
     rate_hz: float,
 ) -> dict[str, Any]: ...
 

@@ -310,7 +310,7 @@ def fuse(
     ConfigError
         A file, a mount or a setting is refused, or no two directions give a first attitude.
     """
-    wanted = (smooth, False)
+    wanted = (smooth, False, False)
     tables = (columns, utc)
     return _replay(recordings, imu, gnss, attitude, mounts, clocks, tables, settings, wanted, rate_hz)
 
@@ -326,6 +326,7 @@ def solve(
     columns: Sequence[str] = (),
     utc: str | None = None,
     settings: Mapping[str, Any] | None = None,
+    points: bool = False,
     rate_hz: float = 10.0,
 ) -> dict[str, Any]:
     """Solve a whole flight at once, as ``hzn fuse --solve`` does.
@@ -341,6 +342,10 @@ def solve(
     ----------
     recordings, imu, gnss, attitude, mounts, clocks, columns, utc, settings, rate_hz
         The same as for `fuse`; only here may ``imu`` be left out.
+    points
+        Use what all edge points of a limb say, the cone that was fitted to them with a free half-angle, instead of the
+        axis that the told altitude and limb height were fused into. It needs recordings with their sensor.toml, as in
+        MCAP, and a receiver.
 
     Returns
     -------
@@ -348,17 +353,19 @@ def solve(
         That of `fuse`; the states with ``phase`` ``"smoothed"`` are those of the solve. ``solved`` is a dictionary with
         ``unknowns``, ``knots``, ``steps``, ``is_converged`` and ``cost`` (before and after); ``determined`` is a list
         with ``name``, ``unit``, ``estimate``, ``sigma`` and ``before``, the sigma of what was known before: where
-        ``sigma`` is far below it, the flight has determined the value. ``lowered`` is a list of the measurements that
-        count less: ``time_s``, ``camera``, ``kind``, ``sigmas``, ``weight``. ``orbit`` is None with an inertial unit; else
-        a dictionary with ``semi_axis_m``, ``eccentricity`` and ``inclination_rad`` at the end, and ``sigma_m`` and
-        ``bound_m``: 1-sigma of the position radial, along and across the orbit, and its Cramér-Rao bound.
+        ``sigma`` is far below it, the flight has determined the value. ``limb_share`` has the shares of the
+        unknown limb height in the variance of a limb's direction, before, and in that of the attitude; None if it is
+        known. ``lowered`` is a list of the measurements that count less: ``time_s``, ``camera``, ``kind``, ``sigmas``,
+        ``weight``. ``orbit`` is None with an inertial unit; else a dictionary with ``semi_axis_m``, ``eccentricity``
+        and ``inclination_rad`` at the end, and ``sigma_m`` and ``bound_m``: 1-sigma of the position
+        radial, along and across the orbit, and its Cramér-Rao bound.
 
     Raises
     ------
     ConfigError
         A file, a mount or a setting is refused, or no two directions give a first attitude.
     """
-    wanted = (False, True)
+    wanted = (False, True, points)
     tables = (columns, utc)
     return _replay(recordings, imu, gnss, attitude, mounts, clocks, tables, settings, wanted, rate_hz)
 
@@ -372,7 +379,7 @@ def _replay(
     clocks: Mapping[str, float] | None,
     tables: tuple[Sequence[str], str | None],
     settings: Mapping[str, Any] | None,
-    wanted: tuple[bool, bool],
+    wanted: tuple[bool, bool, bool],
     rate_hz: float,
 ) -> dict[str, Any]:
     result: dict[str, Any] = _hzn._fuse_flight(

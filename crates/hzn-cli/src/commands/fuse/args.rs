@@ -85,6 +85,12 @@ pub(crate) struct Args {
     /// its attitude: the result is the orbit
     #[arg(long, conflicts_with = "smooth")]
     pub(super) solve: bool,
+    /// With --solve: use what all edge points of a limb say, the cone that was fitted to them with a free half-angle,
+    /// instead of the axis that the told altitude and limb height were fused into. The limb height of all pictures is
+    /// then estimated from the size of the limb, too. It needs recordings with their sensor.toml, as in MCAP, and a
+    /// receiver
+    #[arg(long, requires = "solve")]
+    pub(super) points: bool,
     /// Largest number of solutions per second in the results
     #[arg(long, value_name = "HZ", default_value_t = 10.0)]
     pub(super) rate: f64,

@@ -56,7 +56,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Err(usage(format!("[cameras.{name}]: there is no recording of this name; {}", names(&inputs))));
     }
     let truth = args.truth.as_deref().map(truth::read).transpose()?;
-    let wanted = Wanted { smoothed: args.smooth, solved: args.solve, rate_hz: Some(args.rate) };
+    let wanted = Wanted { smoothed: args.smooth, solved: args.solve, points: args.points, rate_hz: Some(args.rate) };
     let fused = hzn_fuse::fuse(&inputs, &settings, wanted)?;
     if let Some(warning) = outputs.leap_seconds(&fused) {
         tell::line(format_args!("note: {warning}"));

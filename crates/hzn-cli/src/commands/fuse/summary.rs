@@ -132,6 +132,13 @@ fn solve(fused: &Fused, solved: &Solved) -> Vec<(String, String)> {
         let text = format!("{} deg before (filter), {} after (solve)", three(filter), three(last));
         out.push(("  3 sigma at the end".to_owned(), text));
     }
+    out.extend(solved.limb_share.map(|share| {
+        let [before, after] = share.map(|share| 100.0 * share);
+        let text = format!(
+            "causes {before:.1} % of the variance of a limb's direction, and {after:.1} % of that of the attitude"
+        );
+        ("  unknown limb height".to_owned(), text)
+    }));
     out.extend(solved.determined.iter().map(determined));
     for ((camera, kind), count) in &solved.sources {
         let lowered: Vec<_> = solved.lowered.iter().filter(|l| (l.camera, l.kind) == (*camera, *kind)).collect();
