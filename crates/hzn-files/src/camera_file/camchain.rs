@@ -18,6 +18,8 @@ const COLMAP: &[(&str, usize, usize, &str)] = &[
     ("RADIAL", 1, 2, "radtan"),
     ("OPENCV", 2, 4, "radtan"),
     ("FULL_OPENCV", 2, 8, "rational_polynomial"),
+    ("SIMPLE_FISHEYE", 1, 0, "equidistant"),
+    ("FISHEYE", 2, 0, "equidistant"),
     ("SIMPLE_RADIAL_FISHEYE", 1, 1, "equidistant"),
     ("RADIAL_FISHEYE", 1, 2, "equidistant"),
     ("OPENCV_FISHEYE", 2, 4, "equidistant"),
@@ -68,7 +70,7 @@ fn colmap_camera(words: &[String]) -> Result<Value, String> {
     let (focal, rest) = rest.split_at(*focals);
     let (centre, k) = rest.split_at(2);
     let mut k = k.to_vec();
-    if *coefficients > 0 {
+    if *lens != "none" {
         k.resize(k.len().max(4), 0.0);
     }
     let [fx, fy] = [focal[0], focal[focals - 1]];

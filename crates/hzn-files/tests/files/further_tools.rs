@@ -103,6 +103,14 @@ fn colmap() {
         let radial = 1.0 - 0.1 * (x * x + y * y);
         [500.5 * x * radial + 319.75, 500.5 * y * radial + 240.25]
     });
+    // An equidistant fisheye: the radius is the angle.
+    for (words, [fx, fy]) in
+        [("SIMPLE_FISHEYE 640 480 300.5", [300.5, 300.5]), ("FISHEYE 640 480 300.5 302", [300.5, 302.0])]
+    {
+        agrees(&read(&format!("1 {words} 320.25 240.75\n")).unwrap(), |x, y| {
+            fisheye([fx, fy], [319.75, 240.25], [0.0; 4], x, y)
+        });
+    }
     let wrong = read("1 FOV 640 480 500 500 320 240 0.9\n").unwrap_err();
     assert!(wrong.starts_with("camera:1: \"FOV\" is no lens that hzn has; the models are SIMPLE_PINHOLE"), "{wrong}");
     let short = read("1 PINHOLE 640 480 500 320 240\n").unwrap_err();
