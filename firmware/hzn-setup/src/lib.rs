@@ -7,7 +7,7 @@
 
 use hzn_core::body::{Expected, PriorError};
 use hzn_core::error::ConfigError;
-use hzn_core::{Config, Prior, Sensor};
+use hzn_core::{Config, Prior, Sensor, SensorPlace};
 
 /// Same as [`Sensor::new`].
 ///
@@ -16,6 +16,15 @@ use hzn_core::{Config, Prior, Sensor};
 #[inline(never)]
 pub fn new_sensor(config: &Config) -> Result<Sensor<f32>, ConfigError> {
     Sensor::new(config)
+}
+
+/// Same as [`SensorPlace::configure`].
+///
+/// # Errors
+/// Returns the first field that is out of its limits.
+#[inline(never)]
+pub fn configure(place: &mut SensorPlace<f32>, config: &Config) -> Result<(), ConfigError> {
+    place.configure(config)
 }
 
 /// Same as [`Sensor::expect`].

@@ -13,7 +13,7 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use hzn_core::camera::{self, Model};
 use hzn_core::image::{Grey, Layout};
-use hzn_core::{Config, Prior};
+use hzn_core::{Config, Prior, SensorPlace};
 use hzn_core::{observer::Unobserved, pipeline::Workspace};
 use hzn_mps2::board::Board;
 use hzn_mps2::host::{File, exit};
@@ -26,6 +26,7 @@ const HEIGHT: u16 = 1080;
 /// Has room for the 600 points of an edge that the default `edge_points.keep_points` keeps.
 type Lists = Workspace<f32, 2048, 76, 512>;
 static WORKSPACE: ConstStaticCell<Lists> = ConstStaticCell::new(Lists::new());
+static SENSOR: ConstStaticCell<SensorPlace<f32>> = ConstStaticCell::new(SensorPlace::empty());
 
 #[entry]
 fn main() -> ! {
@@ -33,6 +34,15 @@ fn main() -> ! {
         Some(()) => 0,
         None => 1,
     })
+}
+
+/// Makes the sensor where it lies.
+// Not inlined: the configuration must not stay on the stack while a picture is processed.
+#[inline(never)]
+fn configure(place: &mut SensorPlace<f32>) -> Option<()> {
+    // `black_box` hides the configuration from the compiler, which would otherwise leave out the methods that it does
+    // not choose.
+    hzn_setup::configure(place, black_box(&config())).ok()
 }
 
 /// Returns the configuration with the lens of the rocket's flight, at an altitude of 150 km.
@@ -52,10 +62,10 @@ fn run() -> Option<()> {
         return None;
     }
     let workspace = WORKSPACE.try_take()?;
-    // `black_box` hides the configuration from the compiler, which would otherwise leave out the methods that it does
-    // not choose.
-    let sensor = hzn_setup::new_sensor(black_box(&config())).ok()?;
-    let expected = hzn_setup::expect(&sensor, &Prior::default()).ok()?;
+    let place = SENSOR.try_take()?;
+    configure(place)?;
+    let sensor = place.sensor()?;
+    let expected = hzn_setup::expect(sensor, &Prior::default()).ok()?;
     let picture = Grey::try_new(&*picture, Layout::packed(WIDTH.into(), HEIGHT.into(), 1, 8)).ok()?;
     let report = sensor.process(workspace, &picture, &expected, &Unobserved);
 

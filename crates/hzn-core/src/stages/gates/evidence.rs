@@ -4,7 +4,6 @@
 //! has the ground below it, with a second edge of its own.
 
 use super::case::Case;
-use super::lens;
 use super::places::{MAX_PLACES, Places, mean_brightness};
 use super::profile::{LEAST, Light, Values};
 use super::shape::Residuals;
@@ -64,7 +63,7 @@ pub(super) fn weigh<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     places: &Places<T>,
     sky: &Sky<T>,
-    residuals: &Residuals<'_, T>,
+    residuals: &mut Residuals<'_, T>,
 ) -> Option<Evidence<T>> {
     let Case { fit, fused, expected, .. } = *case;
     let var_cos = fused.var_free_cos.filter(|_| !expected.free && expected.scale_height_m > T::ZERO)?;
@@ -106,25 +105,15 @@ pub(super) fn weigh<T: Real, P: Pixels, O: Observer<T>>(
 /// but a chance curve does.
 ///
 /// What the stated errors of the lens bend is taken out first. A lens that is known exactly has no such part.
-fn misfit<T: Real>(case: &Case<'_, T>, places: &Places<T>, residuals: &Residuals<'_, T>) -> T {
-    let is_exact = case.camera.intrinsic_modes().is_none();
-    let rms_px = if is_exact { residuals.rms_px } else { rms_without_lens_px(case, residuals) };
+fn misfit<T: Real>(case: &Case<'_, T>, places: &Places<T>, residuals: &mut Residuals<'_, T>) -> T {
+    let own_px = residuals.rms_px;
+    let rms_px = residuals.without_lens(case, |_, bent| bent.rms_px.min(own_px)).unwrap_or(own_px);
     let scale_px = places
         .get(places.len() / 2)
         .map_or(T::ZERO, |middle| case.expected.scale_height_m * angle_by_m(case) / middle.by_px);
     let rough = scale_px * T::from_f64(ROUGHNESS_SCALE_HEIGHTS);
     let noise = residuals.noise_px.max(T::from_f64(CLEAN_PX));
     (rms_px / (noise * noise + rough * rough).sqrt()).max(T::one()).ln()
-}
-
-/// Returns the RMS of the residuals without what the stated errors of the lens bend, in pixels.
-// Not inlined: the copy of the residuals would be on the stack of every judgement.
-#[inline(never)]
-fn rms_without_lens_px<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>) -> T {
-    let mut shape = residuals.shape.clone();
-    let unbent = lens::unbend(case, residuals, &mut shape)
-        .map(|_| Residuals::new(residuals.curve, &shape, case.config).rms_px.min(residuals.rms_px));
-    unbent.unwrap_or(residuals.rms_px)
 }
 
 /// Returns the derivative of s·e by the height of the limb, 1/m. An angle is a height divided by the distance

@@ -10,7 +10,7 @@
 //! this. The residuals then tell the shape of the lens, with which the half-angle must be the expected one.
 
 use super::case::Case;
-use super::shape::{Curve, Place, RIVAL_FLOOR_PX, Residuals, Shape};
+use super::shape::{Curve, Place, RIVAL_FLOOR_PX, Residuals, Shape, rms};
 use crate::base::linalg::{Triangle, V3, basis, dot};
 use crate::base::real::Real;
 use crate::geometry::block::{LANES, LEAST_GRADIENT2};
@@ -55,23 +55,19 @@ fn half_angle_difference<T: Real>(case: &Case<'_, T>) -> Option<(T, T)> {
     Some((expected.cos - fit.c, (var_free - fused.edge.lens_var_cos).max(T::ZERO) + prior))
 }
 
-/// Fits the cone with the modes of the lens, and replaces the residuals of the shape by those of this fit. `None` if
+/// Fits the cone with the modes of the lens, and replaces the residuals of the points by those of this fit. `None` if
 /// the lens is known exactly, or if the points do not determine the fit.
 // There are two fits, because the weight of the prior needs the residuals that are left, and the first fit has only the
 // noise from point to point.
 #[inline(never)]
-pub(super) fn unbend<T: Real>(
-    case: &Case<'_, T>,
-    residuals: &Residuals<'_, T>,
-    shape: &mut Shape<T>,
-) -> Option<Bend<T>> {
+pub(super) fn unbend<T: Real>(case: &Case<'_, T>, residuals: &mut Residuals<'_, T>) -> Option<Bend<T>> {
     let rows = Rows::new(case, residuals.curve)?;
+    let shape = &mut *residuals.shape;
     let floor_px = T::from_f64(case.config.residual_floor_px.max(RIVAL_FLOOR_PX));
     let points = T::from_i32(shape.len() as i32) / T::from_f64(INDEPENDENT);
     let variance = |sigma_px: T| sigma_px.max(floor_px) * sigma_px.max(floor_px) * points;
     rows.fit(shape, variance(residuals.noise_px))?;
-    let left = Residuals::new(residuals.curve, shape, case.config);
-    rows.fit(shape, variance(left.rms_px))
+    rows.fit(shape, variance(rms(shape)))
 }
 
 /// Makes the rows of the fit.

@@ -125,8 +125,8 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     let curve = Curve::new(case.fit, case.expected.azimuth());
     let mut shape = Shape::new();
     collect_inliers(case.blocks, case.fit, &curve, case.camera, &mut shape);
-    let residuals = Residuals::new(&curve, &shape, case.config);
-    rivals::refuse(case, &residuals)?;
+    let mut residuals = Residuals::new(&curve, &mut shape, case.config);
+    rivals::refuse(case, &mut residuals)?;
     curvature::refuse(case)?;
     departure::refuse(case, binary, &residuals)?;
     let glows = glow::is_likely(case, binary, &places);
@@ -140,7 +140,7 @@ pub(crate) fn judge<T: Real, P: Pixels, O: Observer<T>>(
     side::refuse(case)?;
     // The weights are those of sunlit limbs, for which a layer of airglow is evidence against the limb.
     let evidence =
-        if case.expected.is_airglow { None } else { evidence::weigh(case, binary, &places, &sky, &residuals) };
+        if case.expected.is_airglow { None } else { evidence::weigh(case, binary, &places, &sky, &mut residuals) };
     evidence.iter().for_each(|evidence| binary.observer.evidence(case.number, evidence));
     let p_limb = unlikely::refuse(case, evidence.as_ref())?;
     Ok(Passed { glows, p_limb })

@@ -9,23 +9,23 @@ use crate::model::verdict::Verdict;
 /// Refuses an edge whose points fit another shape better than the cone. If the lens is uncertain, the cone is first
 /// fitted together with the parameters of the lens; the half-angle must then be the expected one, too.
 // The second fit is done only if its result matters, so that other edges do not pay for it.
-pub(super) fn refuse<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>) -> Result<(), Verdict> {
+pub(super) fn refuse<T: Real>(case: &Case<'_, T>, residuals: &mut Residuals<'_, T>) -> Result<(), Verdict> {
     let exact = compare(case, residuals);
     if exact.is_ok() && !lens::explains_half_angle(case) {
         return Ok(());
     }
-    let mut shape = residuals.shape.clone();
-    let Some(bend) = lens::unbend(case, residuals, &mut shape) else { return exact };
-    if exact.is_err() {
-        let floor_px = T::from_f64(case.config.residual_floor_px);
-        let independent = T::from_f64(lens::INDEPENDENT);
-        let bent = Residuals::new(residuals.curve, &shape, case.config).with_bend(bend.chi2, floor_px, independent);
-        compare(case, &bent)?;
-    }
-    let chi = T::from_f64(case.config.max_half_angle_sigma);
-    refuse_if(bend.half_angle_chi2 > chi * chi, Verdict::HalfAngle)
+    let second = residuals.without_lens(case, |bend, bent| {
+        if exact.is_err() {
+            let floor_px = T::from_f64(case.config.residual_floor_px);
+            compare(case, &bent.with_bend(bend.chi2, floor_px, T::from_f64(lens::INDEPENDENT)))?;
+        }
+        let chi = T::from_f64(case.config.max_half_angle_sigma);
+        refuse_if(bend.half_angle_chi2 > chi * chi, Verdict::HalfAngle)
+    });
+    second.unwrap_or(exact)
 }
 
+#[inline(never)]
 fn compare<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>) -> Result<(), Verdict> {
     straight::refuse(residuals)?;
     any_cone::refuse(case, residuals)?;

@@ -1,7 +1,9 @@
 //! The inliers as points of the picture with their residuals from the cone. Rival shapes are fitted to them: circles,
 //! straight lines and polylines. A limb's points fit its cone as well as any of them.
 
+use super::case::Case;
 use super::config::Config;
+use super::lens::{self, Bend};
 use crate::base::linalg::V3;
 use crate::base::median;
 use crate::base::real::Real;
@@ -72,7 +74,7 @@ impl<T: Real> Curve<T> {
 /// The residuals of a fit, and what they say about a rival of the cone.
 pub(super) struct Residuals<'a, T> {
     pub(super) curve: &'a Curve<T>,
-    pub(super) shape: &'a Shape<T>,
+    pub(super) shape: &'a mut Shape<T>,
     /// Weighted RMS, in pixels.
     pub(super) rms_px: T,
     /// Noise from point to point, in pixels.
@@ -88,18 +90,38 @@ pub(super) struct Residuals<'a, T> {
 }
 
 impl<'a, T: Real> Residuals<'a, T> {
-    pub(super) fn new(curve: &'a Curve<T>, shape: &'a Shape<T>, config: &Config) -> Self {
+    pub(super) fn new(curve: &'a Curve<T>, shape: &'a mut Shape<T>, config: &Config) -> Self {
         Self {
             curve,
-            shape,
             rms_px: rms(shape),
             noise_px: local_noise(shape),
             independent: independent(shape),
+            shape,
             floor_px: T::from_f64(RIVAL_FLOOR_PX),
             max_ratio: T::from_f64(config.max_rival_ratio),
             min_evidence: T::from_f64(config.min_evidence),
             bend: T::ZERO,
         }
+    }
+
+    /// Calls a function with the residuals of a cone that is fitted together with the uncertain parameters of the lens.
+    /// `None` if the lens is known exactly, or if the points do not determine this fit.
+    // The residuals are replaced and measured again, because a second list would be the largest thing on the stack.
+    #[inline(never)]
+    pub(super) fn without_lens<R>(
+        &mut self,
+        case: &Case<'_, T>,
+        call: impl FnOnce(&Bend<T>, Residuals<'_, T>) -> R,
+    ) -> Option<R> {
+        let bend = lens::unbend(case, self);
+        let result = bend.map(|bend| call(&bend, Residuals::new(self.curve, self.shape, case.config)));
+        for place in self.shape.iter_mut() {
+            let (number, lane) = (usize::from(place.number) / LANES, usize::from(place.number) % LANES);
+            if let Some(block) = case.blocks.get(number) {
+                place.r = self.curve.distance(block, lane);
+            }
+        }
+        result
     }
 
     /// Makes the residuals of a cone that was fitted together with uncertain parameters of the lens, from the χ² of the
@@ -173,7 +195,7 @@ pub(super) fn collect_inliers<T: Real>(
 }
 
 /// Returns the weighted RMS of the residuals, in pixels.
-fn rms<T: Real>(shape: &Shape<T>) -> T {
+pub(super) fn rms<T: Real>(shape: &Shape<T>) -> T {
     let (mut cost, mut weight) = (T::ZERO, T::ZERO);
     for p in shape {
         cost += p.w * p.r * p.r;

@@ -399,7 +399,7 @@ fn rival_shapes_are_refused_until_every_shape_is_trusted() {
         let curve = Curve::new(&limb.fit, limb.expected.azimuth());
         let mut shape = Shape::new();
         collect_inliers(&limb.blocks, &limb.fit, &curve, &limb.camera, &mut shape);
-        rivals::refuse(&limb.case(), &Residuals::new(&curve, &shape, &limb.config))
+        rivals::refuse(&limb.case(), &mut Residuals::new(&curve, &mut shape, &limb.config))
     };
     assert_eq!(judge(&Limb::exact()), Ok(()));
     let mut straight = Limb::new(|point| ImagePoint { u: point.u, v: 239.5 + 0.02 * (point.u - 320.0) });
