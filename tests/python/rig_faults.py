@@ -169,8 +169,8 @@ def answer_of(program, folder, sensor, picture):
 
 
 def second_looks_of(program, root, seed, frames):
-    """Draws ghosts outside of the limb of one head. Returns for each picture: edges, whether the ghost won, whether a look
-    at a higher threshold has the limb, and the work of this look over that of the picture."""
+    """Draws ghosts outside of the limb of one head. Returns for each picture: its size, edges, whether the ghost won,
+    whether a look at a higher threshold has the limb, and the work of this look over that of the picture."""
     folder, result = root / f"second-{seed}", []
     simulate(program, folder, "ring", seed, frames)
     tell_limb(folder, seed % 2 == 0)
@@ -216,5 +216,6 @@ def print_second_looks(results):
     for size in SECOND_DEG:
         own = [row for row in rows if row[0] == size]
         ghosts = [row for row in own if row[2]]
-        print(f"| {size} | {len(own)} | {sum(row[1] == 1 for row in own)} | {len(ghosts)} | {sum(row[3] for row in ghosts)} "
-              f"| {np.median([row[4] for row in own]):.2f} |")
+        one, limbs = sum(row[1] == 1 for row in own), sum(row[3] for row in ghosts)
+        work = np.median([row[4] for row in own])
+        print(f"| {size} | {len(own)} | {one} | {len(ghosts)} | {limbs} | {work:.2f} |")

@@ -113,6 +113,7 @@ impl<'a, T: Real> Residuals<'a, T> {
         case: &Case<'_, T>,
         call: impl FnOnce(&Bend<T>, Residuals<'_, T>) -> R,
     ) -> Option<R> {
+        case.camera.intrinsic_modes()?;
         let bend = lens::unbend(case, self);
         let result = bend.map(|bend| call(&bend, Residuals::new(self.curve, self.shape, case.config)));
         for place in self.shape.iter_mut() {
