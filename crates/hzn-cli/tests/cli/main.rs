@@ -25,6 +25,7 @@ mod faults;
 mod fly;
 mod fly_rig;
 mod fuse;
+mod fuse_points;
 mod fuse_tables;
 mod gates;
 mod hostile;

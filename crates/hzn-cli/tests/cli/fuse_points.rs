@@ -1,0 +1,23 @@
+//! `hzn fuse --points`: what it needs, and what a solve tells of the limb height.
+
+use crate::fuse::{MOUNTS, flight, fuse};
+
+#[test]
+fn points_need_a_solve_and_the_free_cones() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    flight(at);
+    let (code, _, stderr) = fuse(at, &[&MOUNTS[..], &["-o", "nav.csv", "--points"]].concat());
+    assert!(code == 2 && stderr.contains("--solve"), "{stderr}");
+    // The tables of this flight have no free cones.
+    let (code, _, stderr) = fuse(at, &[&MOUNTS[..], &["-o", "nav.csv", "--solve", "--points"]].concat());
+    assert!(code == 2 && stderr.contains("left: --points needs the freely fitted cone"), "{stderr}");
+    assert!(stderr.contains("hzn run") && stderr.contains("leave --points out"), "{stderr}");
+    assert!(!at.join("nav.csv").exists());
+    let (code, stdout, stderr) = fuse(at, &[&MOUNTS[..], &["-o", "nav.csv", "--solve"]].concat());
+    let line = stdout.lines().find(|line| line.trim_start().starts_with("unknown limb height")).unwrap_or_default();
+    assert!(code == 0 && line.contains("of the variance of a limb's direction, and"), "{stdout}{stderr}");
+    // Two cameras on a vehicle that turns show the limb height.
+    let percents: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    assert!(percents.len() == 2 && percents[0] > 5.0 * percents[1], "{line}");
+}
