@@ -24,7 +24,7 @@ use crate::stages::gates;
 use crate::stages::threshold;
 
 /// The configuration of a sensor: the camera, the body that it searches for, and the parameters of every stage.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Config {
     /// The calibration.
@@ -77,6 +77,37 @@ pub struct Config {
     /// Work budget of a picture.
     #[cfg_attr(feature = "serde", serde(default))]
     pub limits: work::Config,
+}
+
+// Not derived: a derived `clone` makes all parts on the stack, 5.9 KB, and copies them then to where they stay.
+impl Clone for Config {
+    fn clone(&self) -> Self {
+        Self {
+            camera: copy(&self.camera),
+            mount: copy(&self.mount),
+            body: copy(&self.body),
+            bodies: copy(&self.bodies),
+            input: copy(&self.input),
+            brightness: copy(&self.brightness),
+            threshold: copy(&self.threshold),
+            mask: copy(&self.mask),
+            contour: copy(&self.contour),
+            edge_points: copy(&self.edge_points),
+            consensus: copy(&self.consensus),
+            fit: copy(&self.fit),
+            covariance: copy(&self.covariance),
+            gates: copy(&self.gates),
+            retry: copy(&self.retry),
+            track: copy(&self.track),
+            limits: copy(&self.limits),
+        }
+    }
+}
+
+/// Returns a copy of a part of a configuration.
+#[inline(never)]
+fn copy<C: Clone>(part: &C) -> C {
+    part.clone()
 }
 
 section! {

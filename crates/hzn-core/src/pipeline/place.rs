@@ -4,6 +4,7 @@ use super::sensor::Sensor;
 use crate::base::error::ConfigError;
 use crate::base::real::Real;
 use crate::config::Config;
+use crate::geometry::camera::Camera;
 
 /// A place for a [`Sensor`]: an empty one is all zeros, so in a `static` it takes no flash.
 ///
@@ -43,11 +44,17 @@ impl<T: Real> SensorPlace<T> {
     // of a sensor, because it would be on the stack a second time.
     #[inline(never)]
     pub fn configure(&mut self, config: &Config) -> Result<(), ConfigError> {
-        let camera = Sensor::check(config)?;
+        self.put(config, Sensor::check(config)?);
+        Ok(())
+    }
+
+    /// Puts the sensor of a configuration that was checked here.
+    // A function of its own: the sensor on its way into its place must not be on the stack during the check.
+    #[inline(never)]
+    fn put(&mut self, config: &Config, camera: Camera<T>) {
         self.0.clear();
         // The list has room, because it is empty.
         let _ = self.0.push(Sensor::from_checked(config, camera));
-        Ok(())
     }
 
     /// Returns the sensor; `None` if the place is empty.

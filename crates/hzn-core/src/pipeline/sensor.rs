@@ -86,7 +86,7 @@ impl<T: Real> Sensor<T> {
             region: Region::new(&config.mask, &camera),
             vehicle_from_camera: config.mount.and_then(turn),
             camera,
-            config: config.clone(),
+            config: copy_of(config),
         }
     }
 
@@ -216,4 +216,11 @@ impl<T: Real> Sensor<T> {
         let differs = rate.is_some() || temperature.is_some();
         differs.then(|| self.camera.with_rate(rate).with_temperature(temperature))
     }
+}
+
+/// Returns a copy of a configuration.
+// Not inlined: the copy is then made where it stays, and not on the stack first.
+#[inline(never)]
+fn copy_of(config: &Config) -> Config {
+    config.clone()
 }

@@ -79,7 +79,7 @@ pub(super) fn weigh<T: Real, P: Pixels, O: Observer<T>>(
     evidence.set(Term::Misfit, misfit(case, places, residuals));
     // Of a picture that came row by row, only lit and dark pixels are left. A thermal picture shows no sunlit air.
     if !P::STREAMED && expected.is_in_sunlight {
-        Looks::new(case, binary, places, sky).weigh(binary, places, &mut evidence);
+        weigh_looks(case, binary, places, sky, &mut evidence);
     }
     if let Some((axis, sigma)) = &expected.predicted {
         // The density of the direction is Gaussian for a limb, and 1/(4π) for an edge that may give any direction.
@@ -94,6 +94,19 @@ pub(super) fn weigh<T: Real, P: Pixels, O: Observer<T>>(
         evidence.set(Term::Sun, ln_ratio_of_direction(T::from_f64(0.5)));
     }
     Some(evidence)
+}
+
+/// Weighs what the picture shows on both sides of the edge.
+// Not inlined: its lists must not be on the stack while the lens is fitted.
+#[inline(never)]
+fn weigh_looks<T: Real, P: Pixels, O: Observer<T>>(
+    case: &Case<'_, T>,
+    binary: &BinaryPicture<'_, T, P, O>,
+    places: &Places<T>,
+    sky: &Sky<T>,
+    evidence: &mut Evidence<T>,
+) {
+    Looks::new(case, binary, places, sky).weigh(binary, places, evidence);
 }
 
 /// Returns the logarithm of the residuals over those that a limb may have; 0 where a limb may have as large ones.
