@@ -10,6 +10,8 @@ mod colours;
 #[cfg(feature = "recordings")]
 pub mod letters;
 pub mod limb;
+#[cfg(feature = "recordings")]
+pub mod runs;
 pub mod undistorted;
 
 use std::path::{Path, PathBuf};

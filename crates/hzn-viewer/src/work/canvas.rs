@@ -3,7 +3,8 @@
 use std::convert::Infallible;
 
 use hzn_run::overlay::letters::Letters;
-use image::{Rgb, RgbImage};
+use hzn_run::overlay::runs::{self, Ink};
+use image::RgbImage;
 use plotters_backend::text_anchor::{HPos, VPos};
 use plotters_backend::{BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind};
 
@@ -20,37 +21,15 @@ impl<'a> Canvas<'a> {
         Self { image, letters: Letters::default() }
     }
 
-    fn blend(&mut self, [x, y]: [i64; 2], colour: BackendColor) {
-        let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y)) else { return };
-        let Some(Rgb(pixel)) = self.image.get_pixel_mut_checked(x, y) else { return };
-        let (r, g, b) = colour.rgb;
-        for (channel, to) in pixel.iter_mut().zip([r, g, b]) {
-            *channel = (f64::from(*channel) * (1.0 - colour.alpha) + f64::from(to) * colour.alpha).round() as u8;
-        }
-    }
-
-    /// Draws all pixels whose distance from a segment is at most `radius`.
     fn stroke(&mut self, from: BackendCoord, to: BackendCoord, radius: f64, colour: BackendColor) {
         let [a, b] = [from, to].map(|(x, y)| [f64::from(x), f64::from(y)]);
-        let along = [b[0] - a[0], b[1] - a[1]];
-        let square = along[0] * along[0] + along[1] * along[1];
-        let size = [self.image.width(), self.image.height()].map(f64::from);
-        let span = |k: usize| {
-            let (low, high) = (a[k].min(b[k]) - radius, a[k].max(b[k]) + radius);
-            (low.floor().max(0.0) as i64, high.ceil().min(size[k]) as i64)
-        };
-        let ((left, right), (top, bottom)) = (span(0), span(1));
-        for y in top..=bottom {
-            for x in left..=right {
-                let p = [x as f64 - a[0], y as f64 - a[1]];
-                let part =
-                    if square > 0.0 { ((p[0] * along[0] + p[1] * along[1]) / square).clamp(0.0, 1.0) } else { 0.0 };
-                if (p[0] - part * along[0]).hypot(p[1] - part * along[1]) <= radius {
-                    self.blend([x, y], colour);
-                }
-            }
-        }
+        runs::stroke(self.image, [a, b], radius, ink(colour));
     }
+}
+
+fn ink(colour: BackendColor) -> Ink {
+    let (r, g, b) = colour.rgb;
+    Ink { colour: [r, g, b], opacity: colour.alpha }
 }
 
 impl DrawingBackend for Canvas<'_> {
@@ -69,7 +48,8 @@ impl DrawingBackend for Canvas<'_> {
     }
 
     fn draw_pixel(&mut self, (x, y): BackendCoord, colour: BackendColor) -> Drawn {
-        self.blend([x, y].map(i64::from), colour);
+        let [x, y] = [x, y].map(i64::from);
+        runs::fill_row(self.image, y, [x, x], ink(colour));
         Ok(())
     }
 
@@ -85,6 +65,20 @@ impl DrawingBackend for Canvas<'_> {
                 self.draw_line(from, to, style)?;
             }
         }
+        Ok(())
+    }
+
+    fn draw_rect<S: BackendStyle>(&mut self, a: BackendCoord, b: BackendCoord, style: &S, fill: bool) -> Drawn {
+        let corners = [(a.0, a.1), (b.0, a.1), (b.0, b.1), (a.0, b.1), (a.0, a.1)];
+        if !fill {
+            return self.draw_path(corners, style);
+        }
+        // The rows outside of the picture are many in a large area.
+        let last = i64::from(self.image.height());
+        let [left, right] = [a.0.min(b.0), a.0.max(b.0)].map(i64::from);
+        let [top, bottom] = [a.1.min(b.1), a.1.max(b.1)].map(i64::from);
+        let ink = ink(style.color());
+        (top.max(0)..=bottom.min(last)).for_each(|y| runs::fill_row(self.image, y, [left, right], ink));
         Ok(())
     }
 

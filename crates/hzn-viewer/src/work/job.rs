@@ -58,6 +58,15 @@ impl Progress {
         self.total.store(total, Ordering::Relaxed);
         if self.stop.load(Ordering::Relaxed) { Err(JobError::Stopped) } else { Ok(()) }
     }
+    /// Returns the finished fraction, 0 to 1.
+    pub fn fraction(&self) -> f32 {
+        let [done, total] = [&self.done, &self.total].map(|n| n.load(Ordering::Relaxed));
+        done as f32 / total.max(1) as f32
+    }
+    /// Asks the job to stop.
+    pub fn stop(&self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
 }
 
 /// A job in progress. It stops when the handle is dropped.
@@ -87,8 +96,7 @@ impl Job {
     }
     /// Returns the finished fraction, 0 to 1.
     pub fn fraction(&self) -> f32 {
-        let [done, total] = [&self.progress.done, &self.progress.total].map(|n| n.load(Ordering::Relaxed));
-        done as f32 / total.max(1) as f32
+        self.progress.fraction()
     }
     /// Returns the time since the start.
     pub fn age(&self) -> Duration {
@@ -96,7 +104,7 @@ impl Job {
     }
     /// Asks the job to stop.
     pub fn stop(&self) {
-        self.progress.stop.store(true, Ordering::Relaxed);
+        self.progress.stop();
     }
     /// Returns true if the job was asked to stop.
     pub fn is_stopping(&self) -> bool {

@@ -23,7 +23,7 @@ pub(in crate::ui) fn sheet(viewer: &Viewer) -> PlotSheet {
         for (name, value_of) in quantity.lines {
             let parts = |source: Source| {
                 let values = series(viewer, quantity, *value_of, source);
-                polylines(count, 0.0, |i| Some([axis.place(i)?, (*values.get(i)?)?]))
+                polylines(count, column(&axis), |i| Some([axis.place(i)?, (*values.get(i)?)?]))
             };
             lines.push(((*name).to_owned(), parts(Source::Current)));
             lines.push((format!("{name} (compared)"), parts(Source::Other)));
@@ -42,13 +42,20 @@ pub(in crate::ui) fn sheet(viewer: &Viewer) -> PlotSheet {
     PlotSheet { heading, axis: axis.label(), ends: axis.ends(), provenance, refused, rows }
 }
 
+/// Returns the width of a column of a plot on the horizontal axis. More points than two in each of them cannot be seen
+/// on paper.
+fn column(axis: &TimeAxis) -> f64 {
+    let [first, last] = axis.ends();
+    (last - first) / 2000.0
+}
+
 /// Returns the parts of sigma, if they are chosen. A file has lines instead of areas.
 fn sigma_budget(viewer: &Viewer, axis: &TimeAxis) -> Option<PlotRow> {
     let is_chosen = viewer.settings.plotted.iter().any(|name| name == SIGMA_PARTS);
     let heights = if is_chosen { sigma_parts::heights(&sigma_parts::parts(viewer)) } else { Vec::new() };
     let line = |(name, values): (&str, Vec<Option<f64>>)| {
         let value = |i: usize| Some([axis.place(i)?, (*values.get(i)?)?]);
-        (name.to_owned(), polylines(values.len(), 0.0, value))
+        (name.to_owned(), polylines(values.len(), column(axis), value))
     };
     let lines: Vec<_> = heights.into_iter().map(line).collect();
     (!lines.is_empty()).then(|| PlotRow { title: format!("{SIGMA_PARTS}, parts of 1σ [°]"), lines, band: None })
@@ -58,9 +65,7 @@ fn sigma_budget(viewer: &Viewer, axis: &TimeAxis) -> Option<PlotRow> {
 fn navigation(viewer: &Viewer, axis: &TimeAxis) -> Vec<PlotRow> {
     let Some(nav) = &viewer.companions.navigation else { return Vec::new() };
     let chosen = |name: &str| viewer.settings.plotted.iter().any(|p| p == name);
-    let [first, last] = axis.ends();
-    // More points than this cannot be seen on paper.
-    let column = (last - first) / 2000.0;
+    let column = column(axis);
     let mut rows = Vec::new();
     for quantity in NAV_QUANTITIES.iter().filter(|q| chosen(q.name)) {
         let mut lines = Vec::new();

@@ -48,7 +48,7 @@ impl Viewer {
     /// Saves the chosen plots over time.
     pub(in crate::ui) fn export_plots(&mut self, path: PathBuf) {
         let sheet = crate::ui::plots::sheet(self);
-        self.start_job("Saving the plots", move |_| plots::save(&sheet, &path));
+        self.start_job("Saving the plots", move |progress| plots::save(&sheet, &path, progress));
     }
 
     /// Saves all pictures with their overlays as a video.
