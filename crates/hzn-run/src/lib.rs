@@ -8,9 +8,9 @@
 //! [`results`] reads the files that a sink wrote; [`checked_row`] has the checksums of their rows. [`overlay`] draws
 //! the result over a picture, and [`explained`] describes what happened to it, in the words of [`explain`].
 //! [`diagnosis`] says what would make a refused limb the expected one. [`disk`] has the errors of files that cannot be
-//! written. [`terminal`] makes text from files safe for a terminal. [`start`] says what pictures tell about a camera
-//! without a calibration, [`bars`] finds black bars in them, and [`nadir`] turns the limb axis into the direction to
-//! the centre. [`mask`] draws what hides the stars.
+//! written, and [`unread`] the words for pictures that are not read. [`terminal`] makes text from files safe for a
+//! terminal. [`start`] says what pictures tell about a camera without a calibration, [`bars`] finds black bars in them,
+//! and [`nadir`] turns the limb axis into the direction to the centre. [`mask`] draws what hides the stars.
 //!
 //! [`record`] turns an answer into the row of the results; the feature `recordings` adds the files. Without it, a
 //! picture in memory goes through the same code without files, threads and clocks, as a browser has it.
@@ -51,5 +51,6 @@ pub mod source;
 pub mod start;
 mod tangent;
 pub mod terminal;
+pub mod unread;
 
 pub use error::{Error, Kind, Remedy};

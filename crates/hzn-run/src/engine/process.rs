@@ -14,6 +14,7 @@ use super::trace::Traces;
 use crate::error::{Error, failed};
 use crate::overlay::OverlayFolder;
 use crate::source::{Held, Item, Picture};
+use crate::unread;
 #[cfg(feature = "recordings")]
 use crate::{overlay, overlay::caption::Caption, record};
 
@@ -67,7 +68,7 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
     let view = match picture.view(plan.config.input.channel) {
         Ok(view) => view,
         Err(why) => {
-            return Ok(without_picture(sensor, finished, &format!("{why} (input.channel in sensor.toml)")));
+            return Ok(without_picture(sensor, finished, &unread::other_channel(why)));
         }
     };
     let data = finished.data.as_ref();

@@ -1,5 +1,7 @@
 //! Limits of the size of a picture.
 
+use crate::unread;
+
 /// Longest side of a picture that is read, in pixels.
 pub const MAX_SIDE_PX: u32 = 20_000;
 /// Largest decoded picture, in bytes.
@@ -14,10 +16,7 @@ pub(crate) fn check_size(width: u32, height: u32, expected: Option<(u32, u32)>) 
         return Err(format!("picture of {width}x{height} is larger than the limit of {MAX_SIDE_PX} px a side"));
     }
     match expected {
-        Some((w, h)) if (w, h) != (width, height) => Err(format!(
-            "picture is {width}x{height} but the camera is {w}x{h} (camera.width, camera.height in sensor.toml){}",
-            if (h, w) == (width, height) { "; input.orient turns pictures" } else { "" }
-        )),
+        Some((w, h)) if (w, h) != (width, height) => Err(unread::other_size([width, height], [w, h])),
         _ => Ok(()),
     }
 }

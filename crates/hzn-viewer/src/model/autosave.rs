@@ -22,6 +22,9 @@ pub struct Unsaved {
     /// True if the user opened the file himself, so that it stays when other pictures are opened.
     #[serde(default)]
     pub is_opened_by_user: bool,
+    /// Text of the file, if the pictures added something to it. Earlier versions did not store it.
+    #[serde(default)]
+    pub on_file: Option<String>,
     /// Text as it was read or last saved.
     pub saved: String,
     /// Text with the changes.
@@ -38,6 +41,7 @@ impl Unsaved {
             is_file: session.path().is_some(),
             as_read: session.as_read(),
             is_opened_by_user: session.is_opened_by_user(),
+            on_file: (session.on_file() != session.saved()).then(|| session.on_file().text().to_owned()),
             saved: session.saved().text().to_owned(),
             text: session.sheet().text().to_owned(),
             inputs: inputs.iter().map(|p| absolute(p)).collect(),
@@ -46,7 +50,8 @@ impl Unsaved {
     /// Returns the session with its changes. Undo goes back to the saved text.
     pub fn into_session(self) -> Session {
         let as_read = self.is_file.then(|| self.as_read.unwrap_or_else(|| Fingerprint::of(&self.saved)));
-        let mut session = Session::new(&self.saved, &self.home, as_read);
+        let session = Session::new(&self.saved, &self.home, as_read);
+        let mut session = session.completed_from(self.on_file.as_deref().unwrap_or(&self.saved));
         session.set_text(&self.text);
         if self.is_opened_by_user { session.opened_by_user() } else { session }
     }
@@ -115,7 +120,8 @@ mod tests {
         let text = "preset = \"hzn\"\n";
         // The number of bits was added to the text of the file.
         let as_read = Some(Fingerprint::of("before"));
-        let mut session = Session::new(text, Path::new("/flight/sensor.toml"), as_read).opened_by_user();
+        let session = Session::new(text, Path::new("/flight/sensor.toml"), as_read).completed_from("before");
+        let mut session = session.opened_by_user();
         session.set("threshold", "scale", 0, Some(1.5.into()));
         let unsaved = Unsaved::of_session(&session, &[PathBuf::from("/flight")]);
         let own = Autosave::in_folder(dir.path());
@@ -130,6 +136,7 @@ mod tests {
         let mut again = found.into_session();
         assert!(again.is_changed() && again.sheet().text().contains("scale = 1.5"));
         assert!(again.as_read() == as_read && again.is_opened_by_user());
+        assert_eq!(again.on_file().text(), "before");
         again.undo();
         assert!(!again.is_changed());
         own.remove();

@@ -7,23 +7,26 @@ use hzn_core::status::Status;
 use hzn_core::verdict::Verdict;
 use hzn_mcap::Row;
 use hzn_run::explain;
+use hzn_run::unread::Unread;
 
 /// Cause of the status of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cause {
     /// Status of the picture.
     pub status: Status,
-    /// Reason for a picture that has edges but no answer.
+    /// Reason for a picture that has edges but no answer, or that is unreadable.
     pub reason: Option<Reason>,
 }
 
-/// Reason why a picture with edges has no answer.
+/// Reason why a picture with edges has no answer, or why a picture could not be processed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reason {
     /// Otsu's threshold shows a limb, and the threshold in use does not.
     Level,
     /// The verdict of the best candidate.
     Verdict(Verdict),
+    /// Why the picture is unreadable.
+    Unread(Unread),
 }
 
 impl Reason {
@@ -32,6 +35,7 @@ impl Reason {
         match self {
             Self::Level => "threshold",
             Self::Verdict(verdict) => verdict.name(),
+            Self::Unread(unread) => unread.name(),
         }
     }
 }
@@ -49,10 +53,17 @@ impl Cause {
     }
     /// Returns the cause of a result in a file. The detail of a row lists verdicts without inliers.
     pub fn from_row(row: &Row) -> Self {
+        if row.status == Status::Unreadable {
+            return Self { status: row.status, reason: Some(Reason::Unread(Unread::of_detail(&row.detail))) };
+        }
         let names = row.detail.split_once(": ").into_iter().flat_map(|(_, verdicts)| verdicts.split(", "));
         let verdicts = names.filter_map(|name| Verdict::ALL.iter().find(|v| v.name() == name).copied());
         let refused = row.status != Status::Ok;
         Self { status: row.status, reason: explain::best_verdict(verdicts).map(Reason::Verdict).filter(|_| refused) }
+    }
+    /// Returns true if the picture has an edge, which may be the limb.
+    pub fn has_edge(&self) -> bool {
+        self.status == Status::Ok || matches!(self.reason, Some(Reason::Level | Reason::Verdict(_)))
     }
     /// Returns true if this picture belongs to a group.
     pub fn is_in(&self, group: &Group) -> bool {
@@ -132,5 +143,7 @@ mod tests {
         assert_eq!(Cause::from_row(&row).reason, Some(Reason::Verdict(Verdict::HalfAngle)));
         row.detail = "ended at contour".into();
         assert_eq!(Cause::from_row(&row).reason, None);
+        let unread = Row::unprocessed(&meta, Status::Unreadable, hzn_run::unread::other_size([4, 3], [8, 6]));
+        assert_eq!(Cause::from_row(&unread).reason.map(Reason::name), Some("wrong size"));
     }
 }

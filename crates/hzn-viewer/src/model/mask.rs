@@ -13,6 +13,8 @@ pub type Polygons = Vec<Vec<Point>>;
 pub struct MaskEdit {
     /// Corners of the polygon that is being drawn.
     pub open: Vec<Point>,
+    /// Corners that were taken back, the last one first.
+    taken_back: Vec<Point>,
     grabbed: Option<(usize, usize)>,
 }
 
@@ -41,17 +43,34 @@ impl MaskEdit {
             return self.close(polygons);
         }
         self.open.push(p);
+        self.taken_back.clear();
         if self.open.len() == MAX_CORNERS { self.close(polygons) } else { None }
     }
-    /// Closes the polygon if it has at least three corners; otherwise it is dropped. Returns all polygons if it was
+    /// Closes the polygon if it has at least three corners; otherwise it stays open. Returns all polygons if it was
     /// closed.
     pub fn close(&mut self, polygons: &Polygons) -> Option<Polygons> {
-        let new = std::mem::take(&mut self.open);
-        (new.len() >= 3).then(|| polygons.iter().cloned().chain([new]).collect())
+        (self.open.len() >= 3).then(|| polygons.iter().cloned().chain([self.take_open()]).collect())
     }
-    /// Removes the last corner of the polygon that is being drawn.
-    pub fn remove_last_corner(&mut self) {
-        self.open.pop();
+    /// Takes the corners of the polygon that is being drawn.
+    pub fn take_open(&mut self) -> Vec<Point> {
+        self.taken_back.clear();
+        std::mem::take(&mut self.open)
+    }
+    /// Takes the last corner of the polygon that is being drawn back. Returns false if there is none.
+    pub fn undo_corner(&mut self) -> bool {
+        let last = self.open.pop();
+        self.taken_back.extend(last);
+        last.is_some()
+    }
+    /// Returns true if a corner was taken back.
+    pub fn can_redo(&self) -> bool {
+        !self.taken_back.is_empty()
+    }
+    /// Adds the corner again that was taken back last. Returns false if there is none.
+    pub fn redo_corner(&mut self) -> bool {
+        let last = self.taken_back.pop();
+        self.open.extend(last);
+        last.is_some()
     }
     /// Grabs the corner within `reach` of `p`. Returns false if there is none.
     pub fn grab(&mut self, polygons: &Polygons, p: Point, reach: f64) -> bool {
@@ -112,6 +131,9 @@ mod tests {
         edit.click(&square(), [1.0, 1.0], 2.0);
         edit.click(&square(), [9.0, 1.0], 2.0);
         assert_eq!(edit.close(&square()), None);
+        assert_eq!(edit.open.len(), 2, "so it stays open");
+        assert!(edit.undo_corner() && edit.redo_corner() && !edit.redo_corner());
+        assert_eq!(edit.open, [[1.0, 1.0], [9.0, 1.0]]);
     }
 
     #[test]

@@ -90,6 +90,11 @@ impl Sequence {
     pub fn stem(&self) -> &str {
         self.title.trim_end_matches(".part").trim_end_matches(".mcap")
     }
+    /// Returns the time of a picture in words, as its file has it; `None` if it is not known. Every part of the window
+    /// that tells a time uses these words.
+    pub fn time_text(&self, frame: usize) -> Option<String> {
+        Some(format!("{:.3} s", self.entries.get(frame)?.time_s?))
+    }
     /// Returns the time in seconds until the next picture, if both times are known.
     pub fn duration_s(&self, frame: usize) -> Option<f64> {
         Some(self.entries.get(frame + 1)?.time_s? - self.entries.get(frame)?.time_s?)

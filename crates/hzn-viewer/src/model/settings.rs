@@ -225,6 +225,15 @@ impl Settings {
         self.recent.truncate(MAX_RECENT);
     }
 
+    /// Follows the new name of a file that was opened.
+    pub fn rename_recent(&mut self, old: &Path, new: &Path) {
+        let [old, new] = [old, new].map(|path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned()));
+        if old != new && self.recent.contains(&old) {
+            self.recent.retain(|p| *p != new);
+            self.recent.iter_mut().filter(|p| **p == old).for_each(|p| p.clone_from(&new));
+        }
+    }
+
     /// Returns the path of the settings file; `None` if the system names no place for it.
     pub fn default_path() -> Option<PathBuf> {
         let config = std::env::var_os("XDG_CONFIG_HOME").map(PathBuf::from).filter(|p| p.is_absolute());

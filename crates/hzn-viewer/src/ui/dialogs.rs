@@ -1,6 +1,7 @@
 //! Draws the dialog for paths and the differences from the saved file.
 
 use egui::{Key, RichText};
+use hzn_run::overlay::caption;
 
 use super::path_dialog::Purpose;
 use super::viewer::Viewer;
@@ -9,6 +10,7 @@ use super::{placement, theme};
 /// Draws the dialogs. The window with the changes opens at the top left of the picture.
 pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context, picture: egui::Rect) {
     diff(viewer, ctx, picture);
+    let size = size_of_saved_picture(viewer);
     let Some(path_dialog) = &mut viewer.path_dialog else { return };
     if path_dialog.replaces {
         return;
@@ -21,6 +23,7 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context, picture: egui::Rect
         ui.set_width(560.0_f32.min(ctx.content_rect().width() - 60.0));
         ui.heading(path_dialog.purpose.title());
         ui.weak(path_dialog.purpose.hint());
+        size.iter().filter(|_| path_dialog.purpose == Purpose::Picture).for_each(|text| drop(ui.weak(text)));
         ui.add_space(6.0);
         let label = ui.label("Path");
         let field = ui
@@ -62,6 +65,13 @@ pub(super) fn show(viewer: &mut Viewer, ctx: &egui::Context, picture: egui::Rect
     }
 }
 
+/// Says how large the saved picture is, because its caption makes it higher than the picture itself.
+fn size_of_saved_picture(viewer: &Viewer) -> Option<String> {
+    let [w, h] = viewer.frame_view.as_ref()?.size()?.map(|x| x as u32);
+    let whole = h + caption::height_px(w, h);
+    Some(format!("The file has {w} × {whole} px; its upper {w} × {h} px are those of the picture."))
+}
+
 /// Returns true if the key Esc closes a window: no field is being edited, and no menu and no question is open.
 pub(super) fn escape(ctx: &egui::Context) -> bool {
     let is_covered = egui::Popup::is_any_open(ctx) || ctx.memory(|m| m.top_modal_layer().is_some());
@@ -92,11 +102,15 @@ fn diff(viewer: &mut Viewer, ctx: &egui::Context, picture: egui::Rect) {
         return;
     }
     let Some(session) = &viewer.session else { return };
-    let sections = session.sheet().diff_by_section(session.saved());
+    let sections = session.unsaved_lines();
+    let is_completed = session.saved() != session.on_file();
     let mut open = true;
     let window = egui::Window::new("Unsaved changes").open(&mut open).default_pos(placement::beside(picture));
     window.default_width(520.0_f32.min(picture.width() - 40.0)).show(ctx, |ui| {
         changed_lines(ui, &sections, 400.0);
+        if is_completed {
+            ui.weak("The number of bits was found in the pictures. Saving writes it, too.");
+        }
     });
     viewer.showing_diff = open && !escape(ctx);
 }

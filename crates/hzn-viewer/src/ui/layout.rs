@@ -31,8 +31,8 @@ impl Viewer {
         if !dropped.is_empty() {
             self.open_paths(dropped);
         }
-        if dialogs::escape(&ctx) && (self.mask.is_some() || self.circle.is_some()) {
-            (self.mask, self.circle) = (None, None);
+        if dialogs::escape(&ctx) {
+            self.leave_tool();
         }
         let is_next = self.advance(&ctx);
         // The answer is computed while the panels are laid out.

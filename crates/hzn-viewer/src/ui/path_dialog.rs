@@ -40,7 +40,10 @@ impl Purpose {
             Self::Open => "A recording (.mcap), a folder of pictures, a picture, a video, or a sensor.toml",
             Self::SaveSensor => "Comments are kept",
             Self::Compare => "Another sensor.toml for the same camera",
-            Self::Picture => "PNG in the picture's own size",
+            Self::Picture => {
+                "PNG: the picture in its own pixels, from the top left corner, and a caption below it, which makes \
+                 the file higher"
+            }
             Self::Video => "The ending sets the format: .mp4, .mkv, .webm, .mov or .avi; needs ffmpeg on PATH",
             Self::Table => ".csv or .jsonl, with the results that are shown",
             Self::Plots => {

@@ -3,6 +3,7 @@
 use egui::{Color32, Rect, RichText, Ui, vec2};
 use hzn_core::status::Status;
 use hzn_run::overlay::caption::shorten_detail;
+use hzn_run::unread::Unread;
 
 use super::panels::Panel;
 use super::viewer::Viewer;
@@ -16,6 +17,7 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let most = (ui.ctx().content_rect().width() * 0.25).clamp(160.0, 360.0);
     let width = viewer.settings.side_width.min(most);
     let shown = egui::Panel::left("side").default_size(width).size_range(160.0..=most).show(ui, |ui| {
+        theme::keep_scroll_bar_free(ui);
         viewer.scroll_area(Panel::Answer).show(ui, |ui| {
             ui.add_space(6.0);
             answer(viewer, ui);
@@ -66,9 +68,11 @@ fn trouble(viewer: &mut Viewer, ui: &mut Ui) -> bool {
     }
     let refused = viewer.frame_view.as_ref().and_then(|f| Some((f.answers.first()?.refused.clone()?, f.size()?)));
     let Some((why, [w, h])) = refused else { return false };
-    badge(ui, "wrong size", theme::status(Status::Unreadable));
+    let cause = Unread::of_detail(&why);
+    let is_of_picture = matches!(cause, Unread::Size | Unread::Channel);
+    badge(ui, if is_of_picture { cause.name() } else { "unusable sensor" }, theme::status(Status::Unreadable));
     small(ui, &why);
-    if let Some(session) = &mut viewer.session
+    if let Some(session) = viewer.session.as_mut().filter(|_| cause == Unread::Size)
         && ui.button(format!("Scale the camera to {w:.0} × {h:.0}")).clicked()
     {
         camera_card::scale_to(session, [w as u32, h as u32]);
@@ -233,8 +237,6 @@ fn layers(viewer: &mut Viewer, ui: &mut Ui) {
                     viewer.settings.show(layer, on);
                 }
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    // The scroll bar of the column lies here.
-                    ui.add_space(6.0);
                     let (rect, _) = ui.allocate_exact_size(vec2(18.0, 10.0), egui::Sense::hover());
                     for (part, colour) in split(rect, &colours(layer)) {
                         ui.painter().rect_filled(part, 2, colour);

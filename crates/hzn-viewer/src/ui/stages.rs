@@ -44,6 +44,7 @@ fn contents(viewer: &mut Viewer, ui: &mut Ui) {
     if viewer.session.is_none() {
         return show_missing_sensor(viewer, ui);
     }
+    theme::keep_scroll_bar_free(ui);
     viewer.scroll_area(Panel::Stages).show(ui, |ui| {
         // The answer is shared, not copied, because it holds thousands of points.
         let outcome = viewer.frame_view.as_ref().and_then(|s| s.answers.first().cloned());
@@ -83,6 +84,7 @@ fn show_missing_sensor(viewer: &mut Viewer, ui: &mut Ui) {
 /// Draws preset, undo, redo, reset and save, and the error in the text.
 fn header(viewer: &mut Viewer, ui: &mut Ui) {
     ui.add_space(5.0);
+    let (can_undo, can_redo) = (viewer.can_undo(), viewer.can_redo());
     let Some(session) = &mut viewer.session else {
         ui.horizontal(|ui| {
             ui.strong("Stages");
@@ -113,10 +115,10 @@ fn header(viewer: &mut Viewer, ui: &mut Ui) {
                 command = Some(c);
             }
         };
-        button(ui, Command::Undo, "Undo", session.can_undo());
-        button(ui, Command::Redo, "Redo", session.can_redo());
+        button(ui, Command::Undo, "Undo", can_undo);
+        button(ui, Command::Redo, "Redo", can_redo);
         let changed = session.is_changed();
-        button(ui, Command::Diff, "Changes", changed);
+        button(ui, Command::Diff, "Changes", session.sheet() != session.on_file());
         button(ui, Command::Save, "Save", changed);
     });
     if let Some(problem) = session.problem() {

@@ -148,6 +148,11 @@ fn visuals(dark: bool) -> Visuals {
     visuals
 }
 
+/// Keeps the words of a column off the bar that scrolls it: the bar gets a width of its own.
+pub(super) fn keep_scroll_bar_free(ui: &mut egui::Ui) {
+    ui.spacing_mut().scroll.floating_allocated_width = 7.0;
+}
+
 /// Sets up the dark and the light theme; it is called once.
 pub(super) fn apply(ctx: &egui::Context) {
     for (theme, dark) in [(Theme::Dark, true), (Theme::Light, false)] {

@@ -129,7 +129,7 @@ fn place(viewer: &mut Viewer, ui: &mut Ui) {
     let before = viewer.follow.forgotten;
     ui.label(format!("{} of {}{more}", before + frame + 1, before + count));
     if let Some(entry) = viewer.sequence.entries.get(frame) {
-        let time = entry.time_s.map_or("time unknown".to_owned(), |t| format!("{t:.3} s"));
+        let time = viewer.sequence.time_text(frame).unwrap_or_else(|| "time unknown".to_owned());
         ui.label(RichText::new(time).monospace().size(12.0));
         // A long name leaves room for the progress on the right.
         let room = vec2((ui.available_width() - WORK_WIDTH).max(0.0), 18.0);

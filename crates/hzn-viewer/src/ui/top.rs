@@ -139,12 +139,13 @@ fn file_menu(viewer: &mut Viewer, ui: &mut Ui) {
 }
 
 fn edit_menu(viewer: &mut Viewer, ui: &mut Ui) {
-    let (undo, redo, changed) =
-        viewer.session.as_ref().map_or((false, false, false), |s| (s.can_undo(), s.can_redo(), s.is_changed()));
+    let (undo, redo) = (viewer.can_undo(), viewer.can_redo());
+    let changed = viewer.session.as_ref().is_some_and(|s| s.is_changed());
     menu_entry(viewer, ui, Command::Undo, undo);
     menu_entry(viewer, ui, Command::Redo, redo);
     menu_entry(viewer, ui, Command::Reset, changed);
-    menu_entry(viewer, ui, Command::Diff, changed);
+    let differs = viewer.session.as_ref().is_some_and(|s| s.sheet() != s.on_file());
+    menu_entry(viewer, ui, Command::Diff, differs);
     ui.separator();
     let can_calibrate = viewer.session.is_some() && !viewer.sequence.is_empty() && viewer.calibration.is_none();
     for kind in [Kind::Noise, Kind::Lens] {

@@ -63,7 +63,7 @@ fn questions(ui: &mut Ui, wizard: &mut Wizard) {
     egui::Grid::new("wizard").num_columns(2).spacing([12.0, 6.0]).show(ui, |ui| {
         ui.label("picture");
         let camera = wizard.exif.camera.clone().map(|c| format!(", {c}")).unwrap_or_default();
-        ui.label(format!("{w} × {h} px{camera}"));
+        ui.label(format!("{w} × {h} px{camera}")).on_hover_text(&wizard.name);
         ui.end_row();
         ui.label("focal length");
         ui.vertical(|ui| {

@@ -19,6 +19,8 @@ pub(super) enum FocalFrom {
 /// The answers of the user, and what the picture itself says.
 #[derive(Debug)]
 pub(super) struct Wizard {
+    /// Name of the picture that size and EXIF come from.
+    pub(super) name: String,
     pub(super) size_px: [u32; 2],
     pub(super) exif: Exif,
     pub(super) focal_from: FocalFrom,
@@ -41,6 +43,7 @@ impl Wizard {
     pub(super) fn new(size_px: [u32; 2], exif: Exif, has_altitudes: bool) -> Self {
         let known = exif.focal_mm.is_some() || exif.focal_35mm_mm.is_some();
         Self {
+            name: String::new(),
             size_px,
             exif,
             focal_from: if known { FocalFrom::Exif } else { FocalFrom::FieldOfView },

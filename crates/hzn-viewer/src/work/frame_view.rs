@@ -20,7 +20,7 @@ use hzn_mcap::{Row, RowMeta};
 use hzn_run::engine::trace::Edge;
 use hzn_run::engine::{AnySensor, BodyOutcome, Finished, Trace, Traces, Watch};
 use hzn_run::source::Picture;
-use hzn_run::{overlay, sink};
+use hzn_run::{overlay, sink, unread};
 
 use super::paint::Recipe;
 use super::residuals::{Residual, ellipse, residuals};
@@ -427,14 +427,11 @@ pub(super) fn refused_rows(index: usize, entry: &Entry, config: &Config, why: &s
 /// Returns the picture for the sensor, or the reason why the sensor cannot process it.
 pub(super) fn checked_view<'a>(picture: &'a Picture, config: &Config) -> Result<ImageView<'a>, String> {
     let (w, h) = (picture.layout.width, picture.layout.height);
-    let (own_w, own_h) = (u32::from(config.camera.width), u32::from(config.camera.height));
-    if (w, h) != (own_w, own_h) {
-        return Err(format!(
-            "the picture is {w} x {h} px, the sensor's camera {own_w} x {own_h}: open the sensor.toml of this camera, \
-             or set camera.width and height and scale focal lengths and centre with them"
-        ));
+    let own = [config.camera.width, config.camera.height].map(u32::from);
+    if [w, h] != own {
+        return Err(unread::other_size([w, h], own));
     }
-    picture.view(config.input.channel).map_err(|why| format!("{why} (input.channel)"))
+    picture.view(config.input.channel).map_err(unread::other_channel)
 }
 
 fn touched_image(view: &ImageView<'_>, pixels: &HashSet<(u16, u16)>) -> ColorImage {

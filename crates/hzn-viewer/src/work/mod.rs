@@ -27,6 +27,7 @@ pub mod plots;
 mod reader;
 pub mod residuals;
 pub mod rig;
+mod sensor_text;
 mod sequence_source;
 pub mod sky;
 pub mod space;
@@ -42,6 +43,7 @@ pub use engine::{Engine, FrameRequest, Setup};
 pub use frame_view::{BodyResult, FrameView};
 pub use job::Job;
 pub use line::{Computer, Line};
+pub use sensor_text::SensorText;
 
 use std::sync::Arc;
 

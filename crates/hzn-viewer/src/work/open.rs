@@ -16,8 +16,9 @@ use hzn_run::source::{self, Raw, Source, TimeSource};
 use super::entry::entry_of;
 use super::frame_joiner::FrameJoiner;
 use super::frames_table::FramesTable;
+use super::sensor_text::SensorText;
 use super::{Computer, Wake};
-use crate::model::{Entry, Fingerprint, Place};
+use crate::model::{Entry, Place};
 
 /// Request to open a sequence, with the files that belong to it.
 #[derive(Debug, Clone, Default)]
@@ -45,17 +46,6 @@ pub struct Request {
 /// Returns the first input that is not there. A pattern and the line of a flight computer are no files.
 pub fn missing(inputs: &[PathBuf]) -> Option<&PathBuf> {
     inputs.iter().find(|input| !input.exists() && !input.to_string_lossy().contains(['*', '?', '[', ':']))
-}
-
-/// A sensor.toml.
-#[derive(Debug, Clone)]
-pub struct SensorText {
-    /// Text of the file.
-    pub text: String,
-    /// Path of the file. A text from a recording has the path at which it would be saved.
-    pub home: PathBuf,
-    /// Fingerprint of the file; `None` if the text comes from a recording.
-    pub as_read: Option<Fingerprint>,
 }
 
 /// Everything that was opened except the pictures.
@@ -175,7 +165,7 @@ fn is_table(path: &Path) -> bool {
 }
 
 /// Returns the name of a file or folder for the title.
-fn title(path: &Path) -> String {
+pub fn title(path: &Path) -> String {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     absolute.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
 }
@@ -186,7 +176,7 @@ fn read_companions(request: &Request, folder: &Path, recorded_sensor: Option<Sen
     let file =
         |named: &Option<PathBuf>, name: &str| named.clone().or_else(|| Some(folder.join(name)).filter(|p| p.exists()));
     let mut sensor_file = |path: &Path| match hzn_files::limited::read_text(path, hzn_files::limited::SETTINGS_BYTES) {
-        Ok(text) => Some(SensorText { as_read: Some(Fingerprint::of(&text)), text, home: path.to_owned() }),
+        Ok(text) => Some(SensorText::new(text, path, true)),
         Err(e) => {
             opened.notes.push(format!("{}: cannot be read: {e}", path.display()));
             None
@@ -242,11 +232,8 @@ fn complete_sensor(opened: &mut Opened, source: &mut dyn Source, frames: Option<
 fn open_recording(path: &Path, request: &Request, events: &EventSender) -> Result<(), String> {
     let mut index = Index::open(path).map_err(|e| e.to_string())?;
     let folder = path.parent().map(Path::to_owned).unwrap_or_default();
-    let recorded_sensor = index.sensor_toml().map(|text| SensorText {
-        text: text.to_owned(),
-        home: folder.join("sensor.toml"),
-        as_read: None,
-    });
+    let home = folder.join("sensor.toml");
+    let recorded_sensor = index.sensor_toml().map(|text| SensorText::new(text.to_owned(), &home, false));
     // The truth of simulated pictures stays with the pictures: `flight.mcap` next to `flight/truth.csv`.
     let mut request = request.clone();
     let truth_of_folder = path.with_extension("").join("truth.csv");

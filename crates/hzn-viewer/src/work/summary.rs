@@ -40,8 +40,8 @@ pub(super) fn summarise(
     for (index, outcome) in finished.outcomes.iter().enumerate() {
         let row = processed.rows.get(index);
         let (Ok(report), Some(trace), Some(row)) = (&outcome.report, traces.each.get(index), row) else {
-            let status = row.map_or(Status::Unreadable, |r| r.status);
-            processed.causes.push(Cause { status, reason: None });
+            let unknown = Cause { status: Status::Unreadable, reason: None };
+            processed.causes.push(row.map_or(unknown, Cause::from_row));
             processed.fits.push(None);
             processed.sigma_parts.push(None);
             continue;

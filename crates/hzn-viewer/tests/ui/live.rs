@@ -394,6 +394,9 @@ fn a_recording_is_shown_while_it_is_written() {
     let viewer = window.state();
     assert_eq!((viewer.sequence().len(), viewer.is_following()), (4, false));
     assert_eq!(viewer.sequence().recording.as_deref(), Some(growing.as_path()));
+    assert_eq!(viewer.sequence().title, "growing.mcap", "the title follows the new name");
+    assert!(window.query_by_label("growing.mcap   sensor of the recording").is_some());
+    let viewer = window.state();
     assert!((0..4).all(|i| viewer.recorded(i).is_some()), "each picture has its result");
     assert!(!viewer.messages().any(|m| m.contains("not closed")));
 }

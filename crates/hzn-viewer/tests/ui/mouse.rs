@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use egui::{Key, PointerButton, Pos2, Rect, pos2};
+use egui::{Key, Modifiers, PointerButton, Pos2, Rect, pos2};
 use egui_kittest::kittest::{NodeT, Queryable};
 use hzn_viewer::model::view::{Area, Point};
 
@@ -111,6 +111,56 @@ fn the_mask_is_drawn_moved_and_removed() {
     window.key_press(Key::Enter);
     window.run_steps(2);
     assert!(polygons(&window).is_empty());
+}
+
+#[test]
+fn a_mask_that_is_not_closed_comes_back_by_undo() {
+    let (_dir, mut window) = window_on_flight();
+    let corners = [[200.0, 60.0], [300.0, 60.0], [300.0, 140.0]];
+    let undo = |window: &mut Window| {
+        window.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+        window.run_steps(3);
+    };
+    // Each key that ends the tool keeps the corners.
+    for key in [Key::Escape, Key::M, Key::I] {
+        window.key_press(Key::M);
+        window.run_steps(2);
+        for corner in corners {
+            let pos = at(&window, corner);
+            click(&mut window, pos);
+        }
+        window.key_press(key);
+        window.run_steps(3);
+        window.key_press(Key::Enter);
+        window.run_steps(2);
+        assert!(polygons(&window).is_empty(), "{key:?}: there is no open polygon");
+        undo(&mut window);
+        window.key_press(Key::Enter);
+        settled(&mut window);
+        let drawn = polygons(&window);
+        assert!(drawn.len() == 1 && drawn[0].iter().zip(corners).all(|(a, b)| near(*a, b)), "{key:?}: {drawn:?}");
+        undo(&mut window);
+        settled(&mut window);
+        assert!(polygons(&window).is_empty() && !window.state().session().unwrap().is_changed());
+        window.key_press(Key::Escape);
+        window.run_steps(3);
+    }
+    // Undo takes one corner back, and redo adds it again.
+    window.key_press(Key::M);
+    window.run_steps(2);
+    for corner in corners {
+        let pos = at(&window, corner);
+        click(&mut window, pos);
+    }
+    undo(&mut window);
+    window.key_press(Key::Enter);
+    window.run_steps(2);
+    assert!(polygons(&window).is_empty(), "two corners are no area");
+    window.key_press_modifiers(Modifiers::COMMAND, Key::Y);
+    window.run_steps(2);
+    window.key_press(Key::Enter);
+    settled(&mut window);
+    assert_eq!(polygons(&window)[0].len(), 3);
 }
 
 #[test]

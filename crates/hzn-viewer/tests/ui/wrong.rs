@@ -30,7 +30,7 @@ fn wrong_files_are_said_and_the_rest_goes_on() {
     window.key_press(Key::ArrowRight);
     settled(&mut window);
     let refused = frame_view(&window).answers[0].refused.clone().unwrap();
-    assert!(refused.contains("40 x 30") && refused.contains("320 x 240"), "{refused}");
+    assert!(refused.contains("picture is 40x30 but the camera is 320x240"), "{refused}");
     window.key_press(Key::ArrowRight);
     settled(&mut window);
     assert_eq!(answer(&window).0, Status::NoLimb);

@@ -1,5 +1,7 @@
 //! The sensor that is being tuned: its text, the configuration that the text yields, and undo.
 
+mod numbers;
+
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,6 +14,7 @@ use toml_edit::Value;
 
 use super::sheet::{self, Sheet};
 use super::{Fingerprint, atomic_file};
+use numbers::{number, tidy, tidy_px};
 
 /// Largest number of steps that can be undone.
 const MAX_UNDO: usize = 500;
@@ -38,6 +41,8 @@ pub struct Session {
     is_opened_by_user: bool,
     /// Path that messages name. A camera `file` is looked for in the same folder.
     home: PathBuf,
+    /// Text of the file, to which saving is compared.
+    on_file: Sheet,
     saved: Sheet,
     sheet: Sheet,
     undo: Vec<Sheet>,
@@ -66,6 +71,7 @@ impl Session {
             as_read,
             is_opened_by_user: false,
             home: home.to_owned(),
+            on_file: sheet.clone(),
             saved: sheet.clone(),
             sheet,
             undo: Vec::new(),
@@ -92,6 +98,10 @@ impl Session {
         Ok(Self::new(&text, path, Some(Fingerprint::of(&text))))
     }
 
+    /// Returns the session as one whose text was completed when its pictures were opened. `text` is that of the file.
+    pub fn completed_from(self, text: &str) -> Self {
+        Self { on_file: Sheet::new(text), ..self }
+    }
     /// Returns the session as one whose file the user opened himself.
     pub fn opened_by_user(self) -> Self {
         Self { is_opened_by_user: true, ..self }
@@ -108,6 +118,14 @@ impl Session {
     /// Returns the text as it was read or last saved.
     pub fn saved(&self) -> &Sheet {
         &self.saved
+    }
+    /// Returns the text of the file, without what was added when the pictures were opened.
+    pub fn on_file(&self) -> &Sheet {
+        &self.on_file
+    }
+    /// Returns the lines that saving changes in the file, by section.
+    pub fn unsaved_lines(&self) -> Vec<(String, Vec<String>)> {
+        self.sheet.diff_by_section(&self.on_file)
     }
     /// Returns the file of the text.
     pub fn path(&self) -> Option<&Path> {
@@ -332,10 +350,10 @@ impl Session {
     pub fn reload(&mut self) -> Result<(), Problem> {
         let path = self.path.as_deref().unwrap_or(&self.home);
         let text = read_file(path)?;
-        let as_read = Some(Fingerprint::of(&text));
         let mut sheet = Sheet::new(text);
         // If the number of bits was added to the text that was read first, it is added again.
-        let is_completed = self.as_read != Some(Fingerprint::of(self.saved.text()));
+        let is_completed = self.on_file != self.saved;
+        (self.as_read, self.on_file) = (Some(Fingerprint::of(sheet.text())), sheet.clone());
         let bits = sheet::Key { section: "input", name: "bits", body: 0 };
         if is_completed
             && sheet.get(bits).is_none()
@@ -343,7 +361,7 @@ impl Session {
         {
             sheet = sheet.with_value(bits, Some(value)).unwrap_or(sheet);
         }
-        (self.saved, self.as_read) = (sheet.clone(), as_read);
+        self.saved = sheet.clone();
         self.replace(sheet, None);
         // The differences from the saved text are new, even if the text of the window is the same.
         self.read();
@@ -356,7 +374,7 @@ impl Session {
     /// The file cannot be written; the message says why and what to do.
     pub fn save(&mut self, path: &Path) -> Result<(), String> {
         atomic_file::write(path, self.sheet.text().as_bytes())?;
-        self.saved = self.sheet.clone();
+        (self.saved, self.on_file) = (self.sheet.clone(), self.sheet.clone());
         self.as_read = Some(Fingerprint::of(self.sheet.text()));
         self.saved_values = self.values.clone();
         self.differing.clear();
@@ -420,29 +438,6 @@ impl Session {
 /// Reads the text of a sensor.toml.
 fn read_file(path: &Path) -> Result<String, Problem> {
     limited::read_text(path, limited::SETTINGS_BYTES).map_err(|e| Problem::new(path, format!("cannot be read: {e}")))
-}
-
-fn number(value: &toml::Value) -> Option<f64> {
-    match value {
-        toml::Value::Float(x) => Some(*x),
-        toml::Value::Integer(n) => Some(*n as f64),
-        _ => None,
-    }
-}
-
-/// Rounds a number to five significant digits, as a person would write it.
-fn tidy(x: f64) -> f64 {
-    if x == 0.0 || !x.is_finite() {
-        return x;
-    }
-    let digits = (4 - x.abs().log10().floor() as i32).clamp(0, 9);
-    let scale = 10f64.powi(digits);
-    (x * scale).round() / scale
-}
-
-/// Rounds a coordinate of a mask corner to tenths of a pixel, which is fine enough.
-fn tidy_px(x: f64) -> f64 {
-    (x * 10.0).round() / 10.0
 }
 
 #[cfg(test)]

@@ -207,7 +207,9 @@ fn the_bits_that_the_pictures_show_stay_after_a_reload() {
     let path = dir.path().join("sensor.toml");
     std::fs::write(&path, TEXT).unwrap();
     let completed = format!("{TEXT}\n[input]\nbits = 12\n");
-    let mut s = Session::new(&completed, &path, Some(Fingerprint::of(TEXT)));
+    let mut s = Session::new(&completed, &path, Some(Fingerprint::of(TEXT))).completed_from(TEXT);
+    let lines = s.unsaved_lines().into_iter().flat_map(|(_, lines)| lines);
+    assert_eq!(lines.collect::<Vec<_>>(), ["+", "+[input]", "+bits = 12"], "saving writes them");
     assert_eq!(s.file_change(), None, "the window added the bits, no other program");
     let bits = |s: &Session| s.config().unwrap().input.bits;
     let theirs = TEXT.replace("3.0", "4.0");

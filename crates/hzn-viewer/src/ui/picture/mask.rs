@@ -37,18 +37,12 @@ pub(super) fn edit(viewer: &mut Viewer, ui: &Ui, response: &Response, placement:
         tool.release();
         session.end_step();
     }
-    let (enter, back, escape) = ui.input(|i| {
-        (i.key_pressed(egui::Key::Enter), i.key_pressed(egui::Key::Backspace), i.key_pressed(egui::Key::Escape))
-    });
+    let (enter, back) = ui.input(|i| (i.key_pressed(egui::Key::Enter), i.key_pressed(egui::Key::Backspace)));
     if enter {
         new = new.or_else(|| tool.close(&polygons));
     }
-    let leave = escape && tool.open.is_empty();
     if back {
-        tool.remove_last_corner();
-    }
-    if escape {
-        tool.open.clear();
+        tool.undo_corner();
     }
     if let Some(new) = new {
         session.set_polygons(&new);
@@ -56,7 +50,7 @@ pub(super) fn edit(viewer: &mut Viewer, ui: &Ui, response: &Response, placement:
             session.end_step();
         }
     }
-    viewer.mask = (!leave).then_some(tool);
+    viewer.mask = Some(tool);
     grabbing
 }
 
@@ -74,7 +68,7 @@ pub(super) fn draw(viewer: &Viewer, painter: &Painter, placement: &Placement<'_>
     }
     painter.add(Shape::line(line, stroke));
     let text = "Mask: click corners, close on the first one or with Enter. Drag a corner to move it; right-click \
-                removes a corner or an area. Backspace: one corner back. Esc: done.";
+                removes a corner or an area. Backspace or undo: one corner back. Esc: done.";
     let rect = painter.clip_rect();
     label(painter, rect.center_top() + vec2(0.0, 10.0), Align2::CENTER_TOP, text);
 }

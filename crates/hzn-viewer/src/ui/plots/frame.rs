@@ -13,11 +13,35 @@ const LABEL_SIZE: f32 = 11.0;
 /// Height of such a label. The plot leaves out labels whose lines are closer than this.
 const LABEL_HEIGHT: f32 = 15.0;
 
-/// Draws title, legend and values of a plot above it, because a legend inside would cover the lines.
+/// Width of the bar that scrolls the plots, and of an ellipsis.
+const SCROLL_BAR: f32 = 10.0;
+const ELLIPSIS: f32 = 18.0;
+/// Colour of text that is only measured.
+const INK: Color32 = Color32::WHITE;
+
+/// Draws title, legend and values of a plot above it, because a legend inside would cover the lines. What has no room
+/// in the row is in a tooltip.
 pub(super) fn heading(ui: &mut Ui, title: &str, lines: &[(&str, Color32)], values: &str) {
     ui.horizontal(|ui| {
-        ui.label(RichText::new(title).size(12.5));
-        for (name, colour) in lines {
+        ui.add(egui::Label::new(RichText::new(title).size(12.5)).truncate());
+        let width = |text: &str, font: FontId| ui.painter().layout_no_wrap(text.to_owned(), font, INK).size().x;
+        let values_width = if values.is_empty() { 0.0 } else { width(values, FontId::monospace(12.0)) + SCROLL_BAR };
+        // The colours of the lines say more than the last of many values.
+        let values_width = values_width.min(0.5 * ui.available_width());
+        let gap = ui.spacing().item_spacing.x;
+        let widths: Vec<f32> =
+            lines.iter().map(|(name, _)| 10.0 + 2.0 * gap + width(name, FontId::proportional(12.0))).collect();
+        let mut room = ui.available_width() - values_width - 2.0 * gap;
+        if widths.iter().sum::<f32>() > room {
+            room -= ELLIPSIS;
+        }
+        for (n, ((name, colour), width)) in lines.iter().zip(widths).enumerate() {
+            room -= width;
+            if room < 0.0 {
+                let hidden: Vec<&str> = lines.iter().skip(n).map(|(name, _)| *name).collect();
+                ui.weak(RichText::new("…").size(12.0)).on_hover_text(hidden.join("\n"));
+                break;
+            }
             let (rect, _) = ui.allocate_exact_size(vec2(10.0, 10.0), egui::Sense::hover());
             ui.painter().rect_filled(rect.shrink(1.0), 2, *colour);
             ui.weak(RichText::new(*name).size(12.0));
@@ -25,7 +49,7 @@ pub(super) fn heading(ui: &mut Ui, title: &str, lines: &[(&str, Color32)], value
         if !values.is_empty() {
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 // The bar that scrolls the plots lies here.
-                ui.add_space(10.0);
+                ui.add_space(SCROLL_BAR);
                 ui.add(egui::Label::new(RichText::new(values).monospace().size(12.0)).truncate());
             });
         }

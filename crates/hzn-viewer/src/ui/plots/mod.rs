@@ -38,6 +38,16 @@ const LEAST_PANEL: f32 = 120.0;
 /// Distance from the upper border of the panel in points within which the border is dragged.
 const GRIP: f32 = 6.0;
 
+/// What the numbers at the time axis are, if the first picture has another time than zero.
+const SINCE: &str = "time since the first picture";
+/// Room that these words take.
+const LEAST_WORDS: f32 = 180.0;
+
+/// Returns true if the time axis has other numbers than the player.
+fn is_relative(viewer: &Viewer) -> bool {
+    viewer.sequence.entries.iter().find_map(|e| e.time_s).is_some_and(|start| start != 0.0)
+}
+
 pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let part = if viewer.panels.plots_dragged { BY_HAND } else { BY_ITSELF };
     let most = (ui.ctx().content_rect().height() * part).max(LEAST_PANEL);
@@ -115,7 +125,8 @@ fn rows(viewer: &mut Viewer, ui: &mut Ui, chosen: &[String]) {
     // The other plots show the values of this picture with the next frame of the window.
     viewer.hovered_frame = pointed.map(|(frame, _)| frame);
     viewer.plot_span = over_time.then(|| {
-        let (span, cursor_x) = over_time::ruler(ui, &axis, viewer.playback.frame(), RULER);
+        let hint = is_relative(viewer).then_some(SINCE);
+        let (span, cursor_x) = over_time::ruler(ui, &axis, viewer.playback.frame(), RULER, hint);
         viewer.panels.cursor.x = cursor_x;
         span
     });
@@ -143,9 +154,9 @@ fn quantity_choice(viewer: &mut Viewer, ui: &mut Ui, offered: &[&str]) {
         let hint = "Logarithmic scale, of quantities whose values are all above zero";
         ui.separator();
         ui.toggle_value(&mut viewer.settings.log_plots, RichText::new("log").size(12.5)).on_hover_text(hint);
-        // The time line below shows the times of the frames as they are.
-        if viewer.sequence.entries.iter().find_map(|e| e.time_s).is_some_and(|start| start != 0.0) {
-            ui.weak(RichText::new("· time since the first picture").size(12.0));
+        // Where there is no room, the words are in the tooltip of the axis: a row of its own would hide a plot.
+        if is_relative(viewer) && ui.available_size_before_wrap().x >= LEAST_WORDS {
+            ui.weak(RichText::new(format!("· {SINCE}")).size(12.0));
         }
     });
 }

@@ -89,10 +89,13 @@ impl TimeAxis {
         let distance = |(i, p): (usize, &Option<f64>)| Some((i, (p.as_ref()? - x).abs()));
         self.places.iter().enumerate().filter_map(distance).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
     }
-    /// Describes the place of a picture in words.
-    fn text(&self, index: usize) -> String {
-        let time = self.place(index).filter(|_| !self.unit.is_empty()).map(|x| format!(", {x:.3} s"));
-        format!("picture {}{}", index + 1, time.unwrap_or_default())
+    /// Describes the place of a picture in words: its time as the player tells it, and its place on the axis if this
+    /// is another number.
+    fn text(&self, viewer: &Viewer, index: usize) -> String {
+        let time = viewer.sequence.time_text(index).map(|time| format!(", {time}"));
+        let since = self.place(index).filter(|_| self.start_s.is_some_and(|start| start != 0.0));
+        let since = since.map(|s| format!(" ({s:.3} s since the first picture)"));
+        format!("picture {}{}{}", index + 1, time.unwrap_or_default(), since.unwrap_or_default())
     }
     /// Returns where each picture begins and the last one ends, as parts of the axis from its first to its last
     /// picture: a picture reaches halfway to its neighbours. Without an order in time all pictures are equally wide.
@@ -109,8 +112,14 @@ impl TimeAxis {
 }
 
 /// Draws the labels of the horizontal axis below all plots. Returns where the axis begins and ends on the screen, and
-/// where the picture `frame` lies, if it is in view.
-pub(super) fn ruler(ui: &mut Ui, axis: &TimeAxis, frame: usize, height: f32) -> (Rangef, Option<f32>) {
+/// where the picture `frame` lies, if it is in view. `hint` says what the numbers are.
+pub(super) fn ruler(
+    ui: &mut Ui,
+    axis: &TimeAxis,
+    frame: usize,
+    height: f32,
+    hint: Option<&str>,
+) -> (Rangef, Option<f32>) {
     let plot = with_axis(shared_plot("ruler", height), axis)
         .show_axes([true, true])
         .show_grid([false, false])
@@ -120,6 +129,9 @@ pub(super) fn ruler(ui: &mut Ui, axis: &TimeAxis, frame: usize, height: f32) -> 
         .x_axis_formatter(axis_labels(axis.unit));
     let shown = plot.show(ui, |_| ());
     set_label(&shown.response, "time axis");
+    if let Some(hint) = hint {
+        shown.response.clone().on_hover_text(hint);
+    }
     let span = shown.transform.frame().x_range();
     let x = axis.place(frame).map(|place| shown.transform.position_from_point_x(place));
     (span, x.filter(|x| span.contains(*x)))
@@ -281,7 +293,7 @@ pub(super) fn frame_plot(
         response.response.ctx.set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
     }
     let nearest = axis.nearest(at?.x)?;
-    let text = format!("{}\n{}", axis.text(nearest), values_of(nearest));
+    let text = format!("{}\n{}", axis.text(viewer, nearest), values_of(nearest));
     response.response.on_hover_text_at_pointer(text.trim_end());
     Some((nearest, clicked))
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use hzn_core::Preset;
 
 use super::{Leave, Viewer};
-use crate::model::{CircleEdit, Look, MaskEdit, Session, autosave};
+use crate::model::{Look, Session, autosave};
 use crate::ui::Command;
 use crate::ui::panels::Panel;
 use crate::ui::path_dialog::{PathDialog, Purpose};
@@ -30,8 +30,8 @@ impl Viewer {
                     self.ask(PathDialog::new(Purpose::SaveSensor, &autosave::absolute(session.home())));
                 }
             }
-            Command::Undo => self.session.iter_mut().for_each(Session::undo),
-            Command::Redo => self.session.iter_mut().for_each(Session::redo),
+            Command::Undo => self.undo(),
+            Command::Redo => self.redo(),
             Command::Reset => self.session.iter_mut().for_each(Session::reset),
             Command::Diff => self.showing_diff = !self.showing_diff,
             Command::Play => self.toggle_playing(),
@@ -157,23 +157,5 @@ impl Viewer {
             }
             Err(problem) => self.add_problem(problem.to_string()),
         }
-    }
-
-    /// Starts or ends the drawing of the mask.
-    pub(in crate::ui) fn toggle_mask(&mut self) {
-        self.mask = match self.mask.take() {
-            Some(_) => None,
-            None if self.session.is_some() => Some(MaskEdit::default()),
-            None => None,
-        };
-        self.circle = None;
-    }
-
-    /// Starts or ends the dragging of the image circle, which is a circle only in the camera's own picture.
-    pub(in crate::ui) fn toggle_circle(&mut self) {
-        let starts = self.circle.is_none() && self.session.as_ref().is_some_and(|s| s.config().is_some());
-        self.circle = starts.then(CircleEdit::default);
-        self.mask = None;
-        self.settings.undistorted &= !starts;
     }
 }

@@ -23,15 +23,27 @@ use crate::work::study::{Study, Task};
 use crate::work::thumbnails::Thumbnail;
 
 impl Viewer {
-    /// Opens the form for a first sensor.toml, for the shown picture.
+    /// Opens the form for a first sensor.toml, for the picture that the user chose. If another one is still shown, the
+    /// form waits for it: size and EXIF have to come from the same picture.
     pub(in crate::ui) fn open_wizard(&mut self) {
-        let Some(size) = self.frame_view.as_ref().and_then(|f| f.size()) else { return };
-        let exif = match self.sequence.entries.get(self.playback.frame()).map(|e| &e.place) {
+        self.wizard_is_due = true;
+        self.open_due_wizard();
+    }
+
+    /// Opens the form once its picture is shown.
+    pub(super) fn open_due_wizard(&mut self) {
+        let shown = self.frame_view.as_ref().filter(|shown| shown.index == self.playback.frame());
+        let Some(shown) = shown.filter(|_| std::mem::take(&mut self.wizard_is_due)) else { return };
+        let Some(size) = shown.size() else {
+            return self.add_note("This picture cannot be read. Choose another one for the form.");
+        };
+        let exif = match self.sequence.entries.get(shown.index).map(|e| &e.place) {
             Some(Place::File(path)) => hzn_run::source::exif_lens(path).unwrap_or_default(),
             _ => Exif::default(),
         };
         let has_altitudes = self.sequence.has_altitudes();
-        self.wizard = Some(Wizard::new(size.map(|x| x as u32), exif, has_altitudes));
+        let name = shown.name.clone();
+        self.wizard = Some(Wizard { name, ..Wizard::new(size.map(|x| x as u32), exif, has_altitudes) });
     }
 
     /// Starts the measurement of the lens in the pictures, for the form.

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::model::{Autosave, FileChange, Session, Unsaved};
+use crate::model::sheet::Sheet;
+use crate::model::view::Point;
+use crate::model::{Autosave, FileChange, Fingerprint, Session, Unsaved};
 use crate::work::open::Request;
 
 /// What the user wants to do, and what would lose the changes.
@@ -49,12 +51,13 @@ pub(in crate::ui) struct Changes {
     pub(in crate::ui) is_sensor_kept: bool,
     /// The window may close: there is nothing to lose, or the user answered.
     pub(in crate::ui) may_close: bool,
+    /// Corners of a mask polygon that was not closed, and the text at that time.
+    pub(in crate::ui) dropped_corners: Option<(Vec<Point>, Sheet)>,
     /// A session of a window that ended with changes, and its file.
     pub(in crate::ui) lost: Option<(Unsaved, PathBuf)>,
     pub(in crate::ui) autosave: Option<Autosave>,
-    /// Version that was autosaved, and the version that is to be autosaved with the time of its change.
-    pub(in crate::ui) autosaved: Option<u64>,
-    pub(in crate::ui) pending: Option<(u64, Instant)>,
+    /// Version and text that were autosaved, and the time of the writing.
+    pub(in crate::ui) autosaved: Option<((u64, Fingerprint), Instant)>,
 }
 
 impl Changes {

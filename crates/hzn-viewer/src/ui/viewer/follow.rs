@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::{Leave, Viewer};
 use crate::ui::follow::Follow;
 use crate::work::background::{Background, Slot, Task};
-use crate::work::open::Request;
+use crate::work::open::{self, Request};
 
 /// Shortest time between two starts of the work on the pictures that were not shown: the work gets a copy of the list.
 const WORK_EVERY: Duration = Duration::from_secs(1);
@@ -115,6 +115,11 @@ impl Viewer {
         if let Some(recording) = self.sequence.recording.clone().filter(|path| !path.exists())
             && let Some(finished) = without_part(&recording).filter(|path| path.is_file())
         {
+            if let Some(old) = self.request.inputs.first() {
+                self.settings.rename_recent(old, &finished);
+            }
+            // The title is the name of the file, and this file has another name now.
+            self.sequence.title = open::title(&finished);
             self.sequence.inputs = vec![finished.clone()];
             (self.request.inputs, self.sequence.recording) = (self.sequence.inputs.clone(), Some(finished));
         }

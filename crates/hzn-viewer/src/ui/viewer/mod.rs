@@ -10,8 +10,10 @@ mod follow;
 mod jobs;
 mod keep_settings;
 mod line;
+mod mask_tool;
 mod outputs;
 mod outside;
+mod player;
 mod request_key;
 mod rig;
 mod sequence_work;
@@ -57,11 +59,6 @@ pub(super) use outputs::replaced;
 use request_key::RequestKey;
 use sequence_work::SequenceWork;
 
-/// Longest time that playing advances in one frame of the window, for example after the window stood still.
-const LONGEST_PASS: Duration = Duration::from_millis(250);
-/// Shortest wait between two frames of the window while the sequence is played.
-const SHORTEST_WAIT: Duration = Duration::from_millis(4);
-
 /// The window's state.
 pub struct Viewer {
     pub(super) settings: Settings,
@@ -97,6 +94,8 @@ pub struct Viewer {
     checking: Option<Check>,
     pub(super) damaged: Damaged,
     pub(super) wizard: Option<Wizard>,
+    /// The form for a first sensor.toml opens once the chosen picture is shown.
+    wizard_is_due: bool,
     /// The flight computer whose telemetry is shown instead of pictures.
     pub(super) live: Option<LiveView>,
     /// The rig whose heads are shown instead of one sequence.
@@ -193,6 +192,7 @@ impl Viewer {
             checking: None,
             damaged: Damaged::new(),
             wizard: None,
+            wizard_is_due: false,
             live: None,
             rig: None,
             study: None,
@@ -308,22 +308,6 @@ impl Viewer {
     pub fn session_mut(&mut self) -> Option<&mut Session> {
         self.session.as_mut()
     }
-    /// Returns true while the sequence is played.
-    pub fn is_playing(&self) -> bool {
-        self.playback.is_playing()
-    }
-    /// Sets the speed of playing, as a multiple of the speed of the sequence.
-    pub fn set_speed(&mut self, speed: f64) {
-        self.playback.set_speed(speed);
-    }
-    /// Returns the speed of playing.
-    pub fn speed(&self) -> f64 {
-        self.playback.speed()
-    }
-    /// Goes to a picture.
-    pub fn go(&mut self, frame: usize) {
-        self.playback.go(frame, self.sequence.len());
-    }
     /// Returns the settings, for changes.
     pub fn settings_mut(&mut self) -> &mut Settings {
         &mut self.settings
@@ -414,25 +398,6 @@ impl Viewer {
     /// Returns the truth for a picture and a body.
     pub(super) fn truth_of(&self, name: &str, body: &str) -> Option<&Truth> {
         self.truth.get(name)?.iter().find(|t| t.body == body)
-    }
-
-    /// Advances the time of playing. No picture is skipped because it is slow: each is drawn before the next one is
-    /// requested. Returns true if the next picture is to be shown.
-    pub(super) fn advance(&mut self, ctx: &egui::Context) -> bool {
-        let elapsed = std::mem::replace(&mut self.last, Instant::now()).elapsed();
-        let duration_s = |frame| self.sequence.duration_s(frame);
-        let mut is_next = false;
-        if self.frame_view.as_ref().is_none_or(|s| s.index == self.playback.frame()) {
-            // A window that stood still does not catch up; a window that waited for the next picture does.
-            let longest = LONGEST_PASS + std::mem::take(&mut self.planned_wait);
-            is_next = self.playback.advance(elapsed.min(longest), self.sequence.len(), duration_s);
-        }
-        if let Some(due) = self.playback.due(duration_s) {
-            // The window draws nothing until the next picture is due.
-            self.planned_wait = due.max(SHORTEST_WAIT);
-            ctx.request_repaint_after(self.planned_wait);
-        }
-        is_next
     }
 
     /// Stops unfinished writing and stores the settings.

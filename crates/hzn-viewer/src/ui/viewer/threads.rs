@@ -7,14 +7,16 @@ use super::Viewer;
 use super::changes::Leave;
 use super::request_key::RequestKey;
 use super::sequence_work::SequenceWork;
+use crate::model::cause::Cause;
 use crate::model::settings::Layer;
 use crate::model::sigma_parts::SigmaParts;
 use crate::model::steady_edge::EdgeCells;
 use crate::model::{Place, Processed, ResultHistory, Sequence, Session, View, autosave};
 use crate::ui::panels::Panel;
+use crate::work::SensorText;
 use crate::work::check::Check;
 use crate::work::frame_view::Outcome;
-use crate::work::open::{self, SensorText};
+use crate::work::open;
 use crate::work::sweep::{self, Sweep};
 use crate::work::{FrameRequest, FrameView, Setup};
 
@@ -98,7 +100,8 @@ impl Viewer {
         {
             let processed = Processed {
                 rows: outcome.bodies.iter().map(|b| b.row.clone()).collect(),
-                causes: outcome.bodies.iter().filter_map(|b| b.cause).collect(),
+                // Each body has its place in the list, also one that was not looked for.
+                causes: outcome.bodies.iter().map(|b| b.cause.unwrap_or_else(|| Cause::from_row(&b.row))).collect(),
                 fits: outcome.bodies.iter().map(|b| b.fit).collect(),
                 sigma_parts: outcome
                     .bodies
@@ -110,6 +113,7 @@ impl Viewer {
             self.rows.set_current(frame_view.index, processed);
         }
         self.frame_view = Some(frame_view);
+        self.open_due_wizard();
     }
 
     fn handle_opening(&mut self, event: open::Event) {
@@ -178,14 +182,14 @@ impl Viewer {
     /// otherwise write into the folder of another flight. Only a file that the user opened himself stays.
     fn begin_sensor(&mut self, found: Option<SensorText>) {
         // A form or a path that is still being entered belongs to the old pictures.
-        self.wizard = None;
+        (self.wizard, self.wizard_is_due) = (None, false);
         self.cancel_save();
-        (self.changes.agreed, self.changes.is_sensor_kept) = (None, false);
+        (self.changes.agreed, self.changes.is_sensor_kept, self.changes.dropped_corners) = (None, false, None);
         self.path_dialog.take_if(|dialog| dialog.purpose.writes());
         // A sensor that is compared belongs to the old pictures, too.
         self.other = None;
         let is_named = self.request.sensor.is_some();
-        let found = found.map(|s| Session::new(&s.text, &s.home, s.as_read));
+        let found = found.map(|s| Session::new(&s.text, &s.home, s.as_read).completed_from(&s.on_file));
         let found = found.map(|s| if is_named { s.opened_by_user() } else { s });
         let kept = self.session.take().filter(Session::is_opened_by_user);
         if let Some((session, path)) = self.restoring.take() {

@@ -4,11 +4,12 @@ use std::time::{Duration, Instant};
 
 use super::Viewer;
 use super::changes::Leave;
-use crate::model::{Session, Unsaved, autosave};
+use crate::model::{Fingerprint, Session, Unsaved, autosave};
 use crate::work::open::Request;
 
-/// Time from a change until it is autosaved, so that a slider that moves does not write a file with every step.
-const AUTOSAVE_AFTER: Duration = Duration::from_millis(700);
+/// Time between two writes of the autosaved session, so that a slider that moves does not write a file with every step.
+/// The first change is written at once.
+const AUTOSAVE_EVERY: Duration = Duration::from_millis(250);
 
 impl Viewer {
     pub(super) fn has_changes(&self) -> bool {
@@ -119,36 +120,30 @@ impl Viewer {
         }
     }
 
-    /// Writes changes to the autosave file, a moment after the last one.
+    /// Writes changes to the autosave file: the first one at once, and further ones a moment after the last write.
     pub(in crate::ui) fn autosave(&mut self, ctx: &egui::Context) {
         let Some(autosave) = self.changes.autosave.clone() else { return };
         let Some(session) = self.session.as_ref().filter(|s| s.is_changed()) else {
             if self.changes.autosaved.take().is_some() {
                 autosave.remove();
             }
-            self.changes.pending = None;
             return;
         };
-        let version = session.version();
-        if self.changes.autosaved == Some(version) {
-            return;
+        // A text with an error has no version of its own, and is worth keeping, too.
+        let state = (session.version(), Fingerprint::of(session.sheet().text()));
+        let since = match &self.changes.autosaved {
+            Some((saved, _)) if *saved == state => return,
+            Some((_, at)) => at.elapsed(),
+            None => AUTOSAVE_EVERY,
+        };
+        let left = AUTOSAVE_EVERY.saturating_sub(since);
+        if !left.is_zero() {
+            return ctx.request_repaint_after(left);
         }
-        match self.changes.pending {
-            Some((pending, since)) if pending == version => {
-                let left = AUTOSAVE_AFTER.saturating_sub(since.elapsed());
-                if !left.is_zero() {
-                    return ctx.request_repaint_after(left);
-                }
-                let unsaved = Unsaved::of_session(session, &self.sequence.inputs);
-                self.changes.autosaved = Some(version);
-                if let Err(why) = autosave.write(&unsaved) {
-                    self.add_problem(format!("The changes are not autosaved: {why}"));
-                }
-            }
-            _ => {
-                self.changes.pending = Some((version, Instant::now()));
-                ctx.request_repaint_after(AUTOSAVE_AFTER);
-            }
+        let unsaved = Unsaved::of_session(session, &self.sequence.inputs);
+        self.changes.autosaved = Some((state, Instant::now()));
+        if let Err(why) = autosave.write(&unsaved) {
+            self.add_problem(format!("The changes are not autosaved: {why}"));
         }
     }
 }
