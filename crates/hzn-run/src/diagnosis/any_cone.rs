@@ -38,15 +38,39 @@ impl AnyCone {
 
     /// Returns the longest edge that a cone of any half-angle fits.
     pub fn find<P: Pixels>(&mut self, picture: &P, data: Option<&FrameData>) -> Option<Edge> {
+        // A cone of any half-angle goes through many edges; only one that passes every other gate says something.
+        longest_fitted(&self.edges(picture, data)?).filter(|e| has_passed(e)).cloned()
+    }
+
+    /// Returns the longest edge that a cone of any half-angle fits and that passes every other gate. A longer edge may
+    /// be that of a cloud. It is for pictures in which the sensor itself found a limb of another size.
+    pub fn find_limb<P: Pixels>(&mut self, picture: &P, data: Option<&FrameData>) -> Option<Edge> {
+        let edges = self.edges(picture, data)?;
+        let passed = edges.into_iter().filter(|e| has_passed(e) && has_cone(e));
+        passed.max_by_key(length_px)
+    }
+
+    /// Returns the edges of a picture, each with the cone that fits it.
+    fn edges<P: Pixels>(&mut self, picture: &P, data: Option<&FrameData>) -> Option<Vec<Edge>> {
         if !self.single {
             return None;
         }
         let traces = Traces::new(1);
         self.sensor.process_pixels(picture, data, Some(&traces));
-        let edges = traces.each.first()?.edges();
-        // A cone of any half-angle goes through many edges; only one that passes every other gate says something.
-        longest_fitted(&edges).filter(|e| e.outcome.is_some_and(|o| o.verdict == Verdict::Passed)).cloned()
+        Some(traces.each.first()?.edges().clone())
     }
+}
+
+fn has_passed(edge: &Edge) -> bool {
+    edge.outcome.is_some_and(|o| o.verdict == Verdict::Passed)
+}
+
+fn has_cone(edge: &Edge) -> bool {
+    edge.fitted.is_some_and(|f| f.solution.free.is_some())
+}
+
+fn length_px(edge: &Edge) -> u32 {
+    edge.outcome.map_or(0, |o| o.length_px)
 }
 
 /// Returns the configuration of a sensor that fits a cone of any half-angle to each edge.
@@ -62,11 +86,16 @@ fn with_any_cone(config: &Config) -> Config {
 
 /// Returns the longest edge with a fit.
 fn longest_fitted(edges: &[Edge]) -> Option<&Edge> {
-    let fitted = edges.iter().filter(|e| e.fitted.is_some_and(|f| f.solution.free.is_some()));
-    fitted.max_by_key(|e| e.outcome.map_or(0, |o| o.length_px))
+    edges.iter().filter(|e| has_cone(e)).max_by_key(|e| length_px(e))
+}
+
+/// Returns the longest edge that the sensor takes for a limb of another size.
+pub(super) fn longest_of_other_size(edges: &[Edge]) -> Option<&Edge> {
+    let other = |e: &&Edge| e.outcome.is_some_and(|o| o.verdict == Verdict::HalfAngle) && has_cone(e);
+    edges.iter().filter(other).max_by_key(|e| length_px(e))
 }
 
 /// Returns the longest edge.
 pub fn longest_edge(edges: &[Edge]) -> Option<&Edge> {
-    edges.iter().max_by_key(|e| e.outcome.map_or(0, |o| o.length_px))
+    edges.iter().max_by_key(|e| length_px(e))
 }

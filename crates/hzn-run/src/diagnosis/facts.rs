@@ -76,6 +76,15 @@ impl FitFacts {
             Suspect::LimbHeight => self.limb_height_km,
         }
     }
+
+    /// Returns the 1-sigma of what the picture says about a quantity, with all of its sources. The sigma of
+    /// [`Self::implied`] comes from the edge and the lens alone; one picture does not show the error of the expected
+    /// half-angle (limb height and altitude), which is the same in all of them.
+    pub fn total_sigma(&self, suspect: Suspect) -> Option<f64> {
+        let of_edge = self.implied(suspect)?.sigma;
+        let expected = self.expected_sigma_deg / self.fitted_sigma_deg.max(f64::MIN_POSITIVE);
+        Some(of_edge * 1.0f64.hypot(expected))
+    }
 }
 
 /// Returns the medians of what several pictures say; `None` without pictures. Some of the fits may be of clouds.
@@ -115,6 +124,9 @@ pub struct Consensus {
     pub value: f64,
     /// 1.4826 times the median distance from the median: the scatter of one picture as a 1-sigma.
     pub scatter: f64,
+    /// 1-sigma of the value for the user: the scatter, but at least the median of the total sigmas of the pictures. A
+    /// single picture has no scatter, and pictures that are alike have too little.
+    pub sigma: f64,
     /// Scatter divided by the median sigma of the pictures: about 1 if the quantity explains the differences.
     pub disagreement: f64,
     /// Number of pictures.
@@ -140,7 +152,10 @@ pub fn summarise<'a>(facts: impl Iterator<Item = &'a FitFacts> + Clone) -> Vec<C
         let (value, sigma) = (median(&mut values)?, median(&mut sigmas)?);
         let scatter = 1.4826 * median(&mut values.iter().map(|v| (v - value).abs()).collect::<Vec<_>>())?;
         let disagreement = scatter / sigma.max(f64::MIN_POSITIVE);
-        Some(Consensus { suspect, value, scatter, disagreement, pictures: values.len() })
+        let mut totals: Vec<f64> =
+            facts.clone().filter_map(|f| f.total_sigma(suspect)).filter(|s| s.is_finite()).collect();
+        let sigma = scatter.max(median(&mut totals)?);
+        Some(Consensus { suspect, value, scatter, sigma, disagreement, pictures: values.len() })
     };
     let mut all: Vec<_> = Suspect::ALL.into_iter().filter_map(one).collect();
     all.sort_by(|a, b| a.disagreement.total_cmp(&b.disagreement));
@@ -232,6 +247,17 @@ mod tests {
         assert!(summary[1].disagreement > 5.0 && summary[1].pictures == 20);
         assert_eq!(typical_sigmas(all.iter()), Some(9.0));
         assert!(summarise([].iter()).is_empty());
+    }
+
+    #[test]
+    fn one_picture_has_the_sigma_of_its_fit_and_of_the_expected_half_angle() {
+        let one = facts(200.0, 30.0, 0.9);
+        for all in [vec![one], vec![one; 2], vec![one; 9]] {
+            let altitude = summarise(all.iter()).into_iter().find(|c| c.suspect == Suspect::Altitude).unwrap();
+            // The expected half-angle is half as uncertain as the fitted one.
+            let sigma = 2.0 * 1.25f64.sqrt();
+            assert!(altitude.scatter == 0.0 && (altitude.sigma - sigma).abs() < 1e-9, "{altitude:?}");
+        }
     }
 
     #[test]

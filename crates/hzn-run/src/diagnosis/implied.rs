@@ -5,7 +5,7 @@ use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
 use hzn_core::{Report, Solution};
 
-use super::any_cone::longest_edge;
+use super::any_cone::{longest_edge, longest_of_other_size};
 use super::facts::{FitFacts, Implied};
 use crate::engine::trace::{Edge, Fitted};
 use crate::tangent;
@@ -20,7 +20,8 @@ const FACTORS: [f64; 2] = [0.3, 3.0];
 
 /// Returns what the edge of the answer says, with its fit. Without an answer, `trial` returns an edge with a cone of
 /// any half-angle: the sensor's own fit uses only points near a limb with the expected half-angle, so that it misses
-/// most of the limb if the expected one is wrong. Its longest edge counts only if the trial finds nothing.
+/// most of the limb if the expected one is wrong. It counts only if the trial finds nothing: that of the longest edge
+/// whose half-angle alone is wrong, or else of the longest edge.
 pub fn find_fit(
     edges: &[Edge],
     report: &Report<f64>,
@@ -35,7 +36,8 @@ pub fn find_fit(
     if let Some(solution) = &report.solution {
         return facts(edges.iter().find(|e| e.candidate == solution.candidate)?, false);
     }
-    trial().and_then(|edge| facts(&edge, true)).or_else(|| facts(longest_edge(edges)?, false))
+    let of_other_size = || longest_of_other_size(edges).and_then(|edge| facts(edge, false));
+    trial().and_then(|edge| facts(&edge, true)).or_else(of_other_size).or_else(|| facts(longest_edge(edges)?, false))
 }
 
 /// Returns what a fit says. `given_altitude_km` is the altitude that the picture was processed with. `is_trial` is true

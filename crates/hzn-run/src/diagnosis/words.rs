@@ -18,7 +18,8 @@ pub fn what_fits(fit: &FitFacts, camera: &Camera<f64>, width: u16) -> String {
     let altitude = fit
         .altitude_km
         .filter(|i| i.value > 0.0)
-        .map(|Implied { value, sigma }| format!("altitude {value:.0} +- {sigma:.0} km"));
+        .zip(fit.total_sigma(Suspect::Altitude).or(fit.altitude_km.map(|i| i.sigma)))
+        .map(|(Implied { value, .. }, sigma)| format!("altitude {} km", with_sigma(value, sigma)));
     let at = fit.given_altitude_km.map(|km| format!(" at {km:.0} km")).unwrap_or_default();
     let field_of_view = fit
         .focal_factor
@@ -29,6 +30,12 @@ pub fn what_fits(fit: &FitFacts, camera: &Camera<f64>, width: u16) -> String {
         (Some(one), None) | (None, Some(one)) => format!("{limb}: {one}"),
         (None, None) => limb,
     }
+}
+
+/// Returns a value with its sigma. A small sigma has enough digits that it is not zero.
+fn with_sigma(value: f64, sigma: f64) -> String {
+    let digits = if sigma > 0.0 { (-sigma.log10().floor()).clamp(0.0, 6.0) as usize } else { 0 };
+    format!("{value:.digits$} +- {sigma:.digits$}")
 }
 
 /// Says which two values together explain the half-angles of several pictures: `no single value explains the 14

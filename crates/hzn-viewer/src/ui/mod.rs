@@ -1,6 +1,7 @@
 //! The window. [`Viewer`] holds the state and decides. `layout` draws it. Every panel has a separate file and only
 //! draws.
 
+mod agreement;
 mod altitude_trial;
 mod board_form;
 mod calibration;
@@ -38,6 +39,8 @@ mod rig;
 mod rig_view;
 mod side;
 mod situations;
+mod size_cause;
+mod size_table;
 mod space_eye;
 mod space_view;
 mod stages;

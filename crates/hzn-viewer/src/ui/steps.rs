@@ -51,7 +51,8 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui, steps: &[Step]) {
     ui.add_space(3.0);
 }
 
-fn wrapped(ui: &mut Ui, text: &str) {
+/// Draws a text that may have several lines.
+pub(super) fn wrapped(ui: &mut Ui, text: &str) {
     ui.add(egui::Label::new(RichText::new(text).size(12.5)).wrap());
 }
 

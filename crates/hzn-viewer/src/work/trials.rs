@@ -5,11 +5,13 @@ use hzn_core::camera::Camera;
 use hzn_core::error::ConfigError;
 use hzn_core::image::ImageView;
 use hzn_core::status::Status;
+use hzn_core::verdict::Verdict;
 use hzn_core::{Config, Report, Solution, threshold};
 use hzn_files::FrameData;
 use hzn_run::diagnosis::{self, AnyCone, FitFacts};
 use hzn_run::engine::AnySensor;
 use hzn_run::engine::trace::Edge;
+use hzn_run::explain;
 
 /// Sensors for the trials with one configuration.
 pub struct Trials {
@@ -134,10 +136,14 @@ impl Trials {
     ) -> Option<(FitFacts, Solution<f64>, bool)> {
         let mut needs_otsu = false;
         let (view, data) = picture;
+        // The sensor found a limb of another size, also where a longer edge is that of a cloud.
+        let has_limb = explain::best_candidate(report).is_some_and(|best| best.verdict == Verdict::HalfAngle);
         let trial = || {
-            let found = self.try_any_cone(view, data)?;
-            needs_otsu = found.needs_otsu;
-            Some(found.edge)
+            if let Some(found) = self.try_any_cone(view, data) {
+                needs_otsu = found.needs_otsu;
+                return Some(found.edge);
+            }
+            if has_limb { self.any_cone.find_limb(view, data) } else { None }
         };
         let (fit, solution) = diagnosis::find_fit(edges, report, altitude_km, camera, trial)?;
         Some((fit, solution, needs_otsu && fit.is_trial))

@@ -7,7 +7,10 @@ use egui_kittest::kittest::{NodeT, Queryable};
 use hzn_core::camera::{Camera, Config, Model};
 use hzn_core::pixel::ImagePoint;
 use hzn_core::status::Status;
+use hzn_core::verdict::Verdict;
+use hzn_sim::Scenario;
 use hzn_sim::flight::{Flight, rocket};
+use hzn_viewer::model::cause::Reason;
 use hzn_viewer::model::diagnosis::{self, Consensus, Suspect};
 
 use super::window::{HEIGHT, WIDTH, Window, answer, folder, frame_view, settled, until, window_on};
@@ -241,6 +244,35 @@ fn two_wrong_values_are_corrected_together() {
     println!("{inseparable} times altitude and focal length are called inseparable");
     assert_eq!(not_the_limb, 0);
     assert!(3 * mended >= 2 * flights as usize, "{mended} of {flights}");
+}
+
+#[test]
+fn a_refused_picture_has_the_table_also_if_a_cloud_is_longer_than_the_limb() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut scenario = Scenario::builtin("rocket-clean").unwrap();
+    scenario.capture.frames = 12;
+    let mut flight = scenario.flight().unwrap();
+    flight.frames.truncate(1);
+    flight.frames.iter().for_each(|f| f.render().unwrap().save(&dir.path().join(&f.file)).unwrap());
+    // The limb height and the noise of the scene, as `hzn simulate` measures them.
+    (flight.sensor.body.limb_height_km, flight.sensor.body.limb_height_sigma_km) = (18.434, 0.31);
+    (flight.sensor.covariance.sigma_px, flight.sensor.covariance.tilt_px) = (0.001, 0.0);
+    (flight.sensor.covariance.bias_px, flight.sensor.covariance.correlation_px) = (0.0, 0.0);
+    write(&flight, &[Wrong::Altitude(30.0)], dir.path());
+    let mut window = window_on(dir.path());
+    until(&mut window, "not processed", |v| v.processed() == 1 && !v.is_working());
+    window.run_steps(3);
+    let view = frame_view(&window);
+    let (config, body) = (&view.answers[0].config, &view.answers[0].bodies[0]);
+    assert_eq!(body.cause.and_then(|c| c.reason), Some(Reason::Verdict(Verdict::HalfAngle)));
+    let picture = view.picture.as_ref().unwrap().view(config.input.channel).unwrap();
+    let mut any_cone = diagnosis::AnyCone::new(config, false).unwrap();
+    assert!(any_cone.find(&picture, view.data.as_ref()).is_none(), "the longest edge is that of a cloud");
+    let limb = any_cone.find_limb(&picture, view.data.as_ref()).unwrap();
+    // The picture itself says by how much the altitude is wrong.
+    let altitude = body.fit.unwrap().implied(Suspect::Altitude).unwrap();
+    assert!((altitude.value + 30.0).abs() < 5.0 && !limb.points.is_empty(), "{altitude:?}");
+    assert!(window.query_by_label("Try altitude").is_some());
 }
 
 #[test]

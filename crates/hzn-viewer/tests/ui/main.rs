@@ -1,6 +1,7 @@
 //! Tests of the viewer through its accessibility tree and by mouse, as a user or a screen reader would drive it.
 
 mod calibrate;
+mod careful;
 mod causes;
 mod clear;
 mod companions;
