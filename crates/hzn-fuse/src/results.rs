@@ -319,9 +319,10 @@ pub struct Solved {
     pub determined: Vec<Determined>,
     /// Measurements that count less.
     pub lowered: Vec<Lowered>,
-    /// The shares of the unknown limb height in the variance of the limbs' directions, as they were known before, and in
-    /// that of the attitude, over the whole flight: with a known height, the variance would be smaller by this share.
-    /// `None` if the limb height is known.
+    /// The shares of the unknown limb height in the variance of the limbs' directions, as they were known before, and
+    /// in that of the attitude, over the whole flight: with a known height, the variance would be smaller by this
+    /// share.
+    /// `None` if the limb height is known, or if the recordings do not have the derivative of the axis.
     pub limb_share: Option<[f64; 2]>,
     /// Number of measurements of each source.
     pub sources: BTreeMap<(Option<usize>, Kind), usize>,

@@ -15,9 +15,6 @@ fn points_need_a_solve_and_the_free_cones() {
     assert!(stderr.contains("hzn run") && stderr.contains("leave --points out"), "{stderr}");
     assert!(!at.join("nav.csv").exists());
     let (code, stdout, stderr) = fuse(at, &[&MOUNTS[..], &["-o", "nav.csv", "--solve"]].concat());
-    let line = stdout.lines().find(|line| line.trim_start().starts_with("unknown limb height")).unwrap_or_default();
-    assert!(code == 0 && line.contains("of the variance of a limb's direction, and"), "{stdout}{stderr}");
-    // Two cameras on a vehicle that turns show the limb height.
-    let percents: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
-    assert!(percents.len() == 2 && percents[0] > 5.0 * percents[1], "{line}");
+    // Without the derivative of the axes nobody knows what the limb height causes.
+    assert!(code == 0 && !stdout.contains("unknown limb height"), "{stdout}{stderr}");
 }

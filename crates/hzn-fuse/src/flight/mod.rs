@@ -53,9 +53,12 @@ pub struct Wanted {
 }
 
 impl Wanted {
-    /// Refuses what this program was built without.
-    fn check(self) -> Result<(), Error> {
-        if self.solved && !cfg!(feature = "solve") { Err(Error::without_solver()) } else { Ok(()) }
+    /// Refuses what this program was built without, and what the inputs do not have.
+    fn check(self, inputs: &Inputs) -> Result<(), Error> {
+        if self.solved && !cfg!(feature = "solve") {
+            return Err(Error::without_solver());
+        }
+        if self.points { check_points(inputs) } else { Ok(()) }
     }
 }
 
@@ -65,10 +68,7 @@ impl Wanted {
 /// An input is missing or contradicts another one, no two directions give a first attitude, or there are more
 /// measurements than a smoother can keep.
 pub fn fuse(inputs: &Inputs, settings: &Settings, wanted: Wanted) -> Result<Fused, Error> {
-    wanted.check()?;
-    if wanted.points {
-        check_points(inputs)?;
-    }
+    wanted.check(inputs)?;
     let mounts = mounts(&inputs.recordings)?;
     if inputs.imu.is_empty() {
         return without_unit(inputs, settings, &mounts, wanted);
@@ -180,16 +180,17 @@ fn without_unit(
 /// Refuses limbs without free cones, and flights in which nothing says how high the vehicle is.
 fn check_points(inputs: &Inputs) -> Result<(), Error> {
     if inputs.imu.is_empty() || !inputs.has_receiver() {
-        let what =
-            "--points compares the size of the limb with the altitude, which needs an inertial unit and a receiver";
-        return Err(Error::unusable(format!("{what}; give --imu FILE and --gnss FILE, or leave --points out")));
+        return Err(Error::unusable(
+            "--points compares the size of the limb with the altitude, which needs an inertial unit and a receiver; \
+             give --imu FILE and --gnss FILE, or leave --points out",
+        ));
     }
     let limbs = |r: &'_ Recording| r.seen.iter().filter(|s| s.body == Body::Limb).count();
     let cones = |r: &'_ Recording| r.seen.iter().filter(|s| s.cone.is_some()).count();
     match inputs.recordings.iter().find(|r| limbs(r) > 0 && cones(r) == 0) {
         Some(one) => Err(Error::unusable(format!(
-            "{}: --points needs the freely fitted cone of each limb (column var_free_cos) and the sensor.toml; run `hzn \
-             run -o {0}.mcap` again, which stores both, or leave --points out",
+            "{}: --points needs the freely fitted cone of each limb (column var_free_cos) and the sensor.toml; run \
+             `hzn run -o {0}.mcap` again, which stores both, or leave --points out",
             one.name
         ))),
         None => Ok(()),

@@ -167,8 +167,7 @@ impl Recording {
             altitude_sigma_km: largest(|b| b.altitude_sigma_km).filter(|sigma_km| *sigma_km != not_told_km),
             ..Self::default()
         };
-        let sensor = config.and_then(|config| Sensor::new(config).ok());
-        let mut known = HashSet::new();
+        let (sensor, mut known) = (config.and_then(|config| Sensor::new(config).ok()), HashSet::new());
         for (index, row) in rows.iter().enumerate().filter(|(_, row)| row.status == Status::Ok) {
             let body = match row.body.as_str() {
                 "sun" => Body::Sun,

@@ -218,7 +218,8 @@ impl<'a> Problem<'a> {
             let height = s.by_limb_height.norm_squared() * sigma_km * sigma_km;
             (by_limb + height, rest + s.covariance_rad2.as_inner().trace())
         });
-        (rest > 0.0).then(|| by_limb / (by_limb + rest))
+        // Recordings without the derivative do not say what the limb height causes.
+        (by_limb > 0.0 && rest > 0.0).then(|| by_limb / (by_limb + rest))
     }
 
     /// Returns the mounts that were told.

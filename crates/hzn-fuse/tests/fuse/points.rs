@@ -207,7 +207,8 @@ fn what_is_missing_is_named() {
     assert!(text.starts_with(&format!("{name}: --points needs")) && text.contains("var_free_cos"), "{text}");
 }
 
-/// The sensor's answer is its free cone, moved to the expected half-angle: what a row says of one agrees with the other.
+/// The sensor's answer is its free cone, moved to the expected half-angle. What a row says of one agrees with the
+/// other.
 #[test]
 fn a_row_has_the_cone_of_the_sensor() {
     let flight = hzn_sim::flight::leo_infrared(3, 61);

@@ -4,6 +4,7 @@
 //! has the ground below it, with a second edge of its own.
 
 use super::case::Case;
+use super::lens;
 use super::places::{MAX_PLACES, Places, mean_brightness};
 use super::profile::{LEAST, Light, Values};
 use super::shape::Residuals;
@@ -120,7 +121,7 @@ fn weigh_looks<T: Real, P: Pixels, O: Observer<T>>(
 /// What the stated errors of the lens bend is taken out first. A lens that is known exactly has no such part.
 fn misfit<T: Real>(case: &Case<'_, T>, places: &Places<T>, residuals: &mut Residuals<'_, T>) -> T {
     let own_px = residuals.rms_px;
-    let rms_px = residuals.without_lens(case, |_, bent| bent.rms_px.min(own_px)).unwrap_or(own_px);
+    let rms_px = lens::without_lens(case, residuals, |_, bent| bent.rms_px.min(own_px)).unwrap_or(own_px);
     let scale_px = places
         .get(places.len() / 2)
         .map_or(T::ZERO, |middle| case.expected.scale_height_m * angle_by_m(case) / middle.by_px);

@@ -55,12 +55,33 @@ fn half_angle_difference<T: Real>(case: &Case<'_, T>) -> Option<(T, T)> {
     Some((expected.cos - fit.c, (var_free - fused.edge.lens_var_cos).max(T::ZERO) + prior))
 }
 
+/// Calls a function with the residuals of a cone that is fitted together with the uncertain parameters of the lens.
+/// `None` if the lens is known exactly, or if the points do not determine this fit.
+// The residuals are replaced and measured again, because a second list would be the largest thing on the stack.
+#[inline(never)]
+pub(super) fn without_lens<T: Real, R>(
+    case: &Case<'_, T>,
+    residuals: &mut Residuals<'_, T>,
+    call: impl FnOnce(&Bend<T>, Residuals<'_, T>) -> R,
+) -> Option<R> {
+    case.camera.intrinsic_modes()?;
+    let bend = unbend(case, residuals);
+    let result = bend.map(|bend| call(&bend, Residuals::new(residuals.curve, residuals.shape, case.config)));
+    for place in residuals.shape.iter_mut() {
+        let (number, lane) = (usize::from(place.number) / LANES, usize::from(place.number) % LANES);
+        if let Some(block) = case.blocks.get(number) {
+            place.r = residuals.curve.distance(block, lane);
+        }
+    }
+    result
+}
+
 /// Fits the cone with the modes of the lens, and replaces the residuals of the points by those of this fit. `None` if
 /// the lens is known exactly, or if the points do not determine the fit.
 // There are two fits, because the weight of the prior needs the residuals that are left, and the first fit has only the
 // noise from point to point.
 #[inline(never)]
-pub(super) fn unbend<T: Real>(case: &Case<'_, T>, residuals: &mut Residuals<'_, T>) -> Option<Bend<T>> {
+fn unbend<T: Real>(case: &Case<'_, T>, residuals: &mut Residuals<'_, T>) -> Option<Bend<T>> {
     let rows = Rows::new(case, residuals.curve)?;
     let shape = &mut *residuals.shape;
     let floor_px = T::from_f64(case.config.residual_floor_px.max(RIVAL_FLOOR_PX));

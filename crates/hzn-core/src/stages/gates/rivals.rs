@@ -14,12 +14,11 @@ pub(super) fn refuse<T: Real>(case: &Case<'_, T>, residuals: &mut Residuals<'_, 
     if exact.is_ok() && !lens::explains_half_angle(case) {
         return Ok(());
     }
-    let second = residuals.without_lens(case, |bend, bent| {
+    let [floor_px, chi] = [case.config.residual_floor_px, case.config.max_half_angle_sigma].map(T::from_f64);
+    let second = lens::without_lens(case, residuals, |bend, bent| {
         if exact.is_err() {
-            let floor_px = T::from_f64(case.config.residual_floor_px);
             compare(case, &bent.with_bend(bend.chi2, floor_px, T::from_f64(lens::INDEPENDENT)))?;
         }
-        let chi = T::from_f64(case.config.max_half_angle_sigma);
         refuse_if(bend.half_angle_chi2 > chi * chi, Verdict::HalfAngle)
     });
     second.unwrap_or(exact)

@@ -1,9 +1,7 @@
 //! The inliers as points of the picture with their residuals from the cone. Rival shapes are fitted to them: circles,
 //! straight lines and polylines. A limb's points fit its cone as well as any of them.
 
-use super::case::Case;
 use super::config::Config;
-use super::lens::{self, Bend};
 use crate::base::linalg::V3;
 use crate::base::median;
 use crate::base::real::Real;
@@ -102,27 +100,6 @@ impl<'a, T: Real> Residuals<'a, T> {
             min_evidence: T::from_f64(config.min_evidence),
             bend: T::ZERO,
         }
-    }
-
-    /// Calls a function with the residuals of a cone that is fitted together with the uncertain parameters of the lens.
-    /// `None` if the lens is known exactly, or if the points do not determine this fit.
-    // The residuals are replaced and measured again, because a second list would be the largest thing on the stack.
-    #[inline(never)]
-    pub(super) fn without_lens<R>(
-        &mut self,
-        case: &Case<'_, T>,
-        call: impl FnOnce(&Bend<T>, Residuals<'_, T>) -> R,
-    ) -> Option<R> {
-        case.camera.intrinsic_modes()?;
-        let bend = lens::unbend(case, self);
-        let result = bend.map(|bend| call(&bend, Residuals::new(self.curve, self.shape, case.config)));
-        for place in self.shape.iter_mut() {
-            let (number, lane) = (usize::from(place.number) / LANES, usize::from(place.number) % LANES);
-            if let Some(block) = case.blocks.get(number) {
-                place.r = self.curve.distance(block, lane);
-            }
-        }
-        result
     }
 
     /// Makes the residuals of a cone that was fitted together with uncertain parameters of the lens, from the χ² of the
