@@ -264,13 +264,14 @@ columns! {
         limb_height_est_km: Option<f64>,
         /// 1σ of that height, from the half-angle and the altitude, kilometres.
         limb_height_est_sigma_km: Option<f64>,
-        /// Covariance of the axis with the cosine of the half-angle in the fit with a free half-angle, x, rad.
+        /// Covariance of the axis with the cosine of the half-angle in the fit with a free half-angle, x, rad; not of
+        /// a flight computer.
         cov_free_cos_x: Option<f64>,
         /// Covariance of that axis with the cosine, y, rad.
         cov_free_cos_y: Option<f64>,
         /// Covariance of that axis with the cosine, z, rad.
         cov_free_cos_z: Option<f64>,
-        /// Variance of the cosine of the half-angle in that fit.
+        /// Variance of the cosine of the half-angle in that fit; not of a flight computer.
         var_free_cos: Option<f64>,
     }
 }
@@ -323,6 +324,13 @@ impl Row {
     pub fn with_protection(self, factor: Option<f64>) -> Self {
         let sigma_deg = self.p_limb.and(self.sigma_max_deg);
         Self { protection_deg: sigma_deg.zip(factor).and_then(|(sigma, factor)| finite(sigma * factor)), ..self }
+    }
+
+    /// Leaves out what the packets of a flight computer do not have: the correlation of the free axis with its
+    /// half-angle. A picture then has the same row by telemetry and by a run in the flight computer's precision.
+    #[must_use]
+    pub fn as_sent(self) -> Self {
+        Self { cov_free_cos_x: None, cov_free_cos_y: None, cov_free_cos_z: None, var_free_cos: None, ..self }
     }
 
     fn set_answer<T: Real>(&mut self, s: &Solution<T>) {

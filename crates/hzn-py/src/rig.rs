@@ -314,6 +314,7 @@ fn finished(name: String, data: FrameData, outcomes: Vec<BodyOutcome>) -> Finish
         stamp: None,
         data: Some(data),
         outcomes,
+        is_flight: false,
         drawing: Default::default(),
         picture: None,
         glimpse: None,

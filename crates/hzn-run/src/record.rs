@@ -38,7 +38,8 @@ pub fn rows(frame: &Finished, config: &Config) -> Vec<Row> {
             Err(e) => Row::unprocessed(&meta, e.status, e.why.clone()),
         }
     };
-    (0..).zip(config.each_body().iter().zip(&frame.outcomes)).map(row).collect()
+    let rows = (0..).zip(config.each_body().iter().zip(&frame.outcomes)).map(row);
+    rows.map(|row| if frame.is_flight { row.as_sent() } else { row }).collect()
 }
 
 /// Returns the records of a picture, one for each body. The pixels and the drawing are moved out of the picture, into

@@ -190,7 +190,7 @@ fn check_points(inputs: &Inputs) -> Result<(), Error> {
     match inputs.recordings.iter().find(|r| limbs(r) > 0 && cones(r) == 0) {
         Some(one) => Err(Error::unusable(format!(
             "{}: --points needs the freely fitted cone of each limb (column var_free_cos) and the sensor.toml; run \
-             `hzn run -o {0}.mcap` again, which stores both, or leave --points out",
+             `hzn run -o {0}.mcap` again without --flight, which stores both, or leave --points out",
             one.name
         ))),
         None => Ok(()),

@@ -32,6 +32,8 @@ pub struct Finished {
     pub data: Option<FrameData>,
     /// The outcome of each body, in the order of the configuration.
     pub outcomes: Vec<BodyOutcome>,
+    /// Whether the answers are those of the sensor of a flight computer, in single precision.
+    pub is_flight: bool,
     /// The drawing over the picture, if the plan asks for it.
     pub drawing: hzn_mcap::Annotations,
     /// The picture as PNG or JPEG, if the plan asks for it.

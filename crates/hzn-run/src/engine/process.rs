@@ -48,6 +48,7 @@ fn process_and_draw(plan: &Plan, sensor: &mut AnySensor, index: u64, mut item: I
         stamp: item.stamp,
         data,
         outcomes: Vec::new(),
+        is_flight: plan.flight,
         drawing: Annotations::default(),
         picture: None,
         glimpse: None,

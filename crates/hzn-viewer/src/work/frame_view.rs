@@ -311,6 +311,7 @@ impl<'a> FrameInput<'a> {
             stamp: None,
             data: self.data.cloned(),
             outcomes,
+            is_flight: false,
             drawing: hzn_mcap::Annotations::default(),
             picture: None,
             glimpse: None,

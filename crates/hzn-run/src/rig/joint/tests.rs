@@ -33,8 +33,8 @@ fn joiner() -> Joiner {
     Joiner::new(&rig::parse(RIG, Path::new("rig.toml")).unwrap(), &sensors).unwrap()
 }
 
-/// A picture with an answer along the optical axis, with or without a free cone.
-fn finished(time_s: f64, has_cone: bool) -> Finished {
+/// An answer along the optical axis, with or without a free cone.
+fn solution(has_cone: bool) -> Solution<f64> {
     let axis = UnitVec3::try_new([0.0, 0.0, 1.0]).unwrap();
     let covariance = Cov3::from_upper([1e-6, 0.0, 0.0, 1e-6, 0.0, 0.0]);
     let free = Free {
@@ -46,7 +46,7 @@ fn finished(time_s: f64, has_cone: bool) -> Finished {
         cos_per_px: 1e-3,
         common: None,
     };
-    let solution = Solution {
+    Solution {
         axis,
         covariance,
         common: None,
@@ -64,7 +64,11 @@ fn finished(time_s: f64, has_cone: bool) -> Finished {
         inliers: 100,
         arc_px: 300.0,
         candidate: 0,
-    };
+    }
+}
+
+/// A picture with this answer.
+fn finished(time_s: f64, has_cone: bool) -> Finished {
     let report = Report {
         status: Status::Ok,
         stage: Stage::Threshold,
@@ -72,7 +76,7 @@ fn finished(time_s: f64, has_cone: bool) -> Finished {
         next_level: None,
         counters: Default::default(),
         candidates: Default::default(),
-        solution: Some(solution),
+        solution: Some(solution(has_cone)),
         is_suspect: false,
     };
     Finished {
@@ -82,6 +86,7 @@ fn finished(time_s: f64, has_cone: bool) -> Finished {
         stamp: None,
         data: None,
         outcomes: vec![BodyOutcome { report: Ok(report), elapsed: Duration::ZERO }],
+        is_flight: false,
         drawing: Default::default(),
         picture: None,
         glimpse: None,
