@@ -326,7 +326,8 @@ impl Board for Linux {
         // The same conversion as in `hzn run --flight`, so that the numbers have the same bits.
         let report = widen_report(report);
         let mut row = Row::from_report(&meta, &report, Some(f64::from(exposure.calculation_us)))
-            .with_protection(head.protection_factor);
+            .with_protection(head.protection_factor)
+            .as_sent();
         row.head.clone_from(&head.name);
         head.note_meta(exposure.picture, meta);
         let mut record = FrameRecord::new(row);
