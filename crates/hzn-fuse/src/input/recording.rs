@@ -11,7 +11,7 @@ use hzn_nav::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_run::results::Results;
 use nalgebra::Matrix3;
 
-use super::cone::FreeCone;
+use super::cone::{FreeCone, symmetric};
 use super::mount;
 use crate::error::Error;
 
@@ -233,7 +233,6 @@ fn seen(
     sensor: Option<&Sensor<f64>>,
 ) -> Option<Seen> {
     let axis = Vector::from(row.axis()?);
-    let symmetric = |[xx, xy, xz, yy, yz, zz]: [f64; 6]| Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     let three = |x: [Option<f64>; 3]| Some(Vector::new(x[0]?, x[1]?, x[2]?));
     let mut seen = Seen {
         time_s,

@@ -3,14 +3,14 @@
 //! `HZN_FLIGHTS=40 cargo test --test fuse points:: -- --nocapture` flies 40 flights; without the variable a few of
 //! them.
 
-use crate::common::{Draws, scene};
-use crate::solve::{Table, at_time, differences, own, rms};
+use crate::common::{Draws, flights};
+use crate::solve::{Table, at_time, differences, drawn_with, own, rms};
 use hzn_core::HostHorizon;
 use hzn_core::ellipsoid::{WGS84_A_M, WGS84_B_M, geodetic};
 use hzn_fuse::flight::{Wanted, with_problem};
 use hzn_fuse::fuse;
 use hzn_fuse::input::{Body, FreeCone, Inputs, Recording};
-use hzn_fuse::simulated::{Errors, Moment, inputs};
+use hzn_fuse::simulated::{Errors, Moment};
 use hzn_host::Compiled;
 use hzn_mcap::{Row, RowMeta};
 use hzn_nav::frames::{Cam, Covariance, Rotation, Vector};
@@ -21,7 +21,7 @@ use nalgebra::{Matrix3, Vector3};
 const FIRST_SEED: u64 = 86_000;
 /// Mean radius of the Earth, km.
 const RADIUS_KM: f64 = 6371.0;
-/// 1-sigma of the limb height, km.
+/// 1-sigma of the limb height, km: that of the drawn flights.
 const HEIGHT_KM: f64 = 7.0;
 /// Errors of a cone: 1-sigma along the line to the limb's middle, across it, and of the half-angle, rad; with the
 /// correlation of the first with the last, as a short arc has it.
@@ -128,17 +128,9 @@ impl Errors for Cones {
     }
 }
 
-/// Returns a flight whose mounts, biases, clocks and limb height are drawn from the settings.
+/// Returns a flight whose errors are drawn from the settings, with free cones.
 fn drawn(seed: u64) -> (Scenario, Inputs) {
-    let mut scene = scene(seed);
-    let mut draws = Draws(seed ^ 0x501e);
-    for camera in &mut scene.cameras {
-        camera.clock.latency_s = 0.03;
-        camera.clock.offset_s = 0.2 * draws.normal() - 0.03;
-    }
-    let height_km = HEIGHT_KM * draws.normal();
-    let drawn = inputs(&scene, &mut Cones::new(seed), height_km).unwrap();
-    (scene, drawn)
+    drawn_with(seed, &mut Cones::new(seed))
 }
 
 fn wanted(points: bool) -> Wanted {
@@ -163,7 +155,7 @@ fn flights_are_better_with_the_size_of_the_limb() {
     settings.camera.misalignment_deg.sigma = 0.02;
     let (mut tables, mut shares) = ([Table::default(), Table::default()], [Vec::new(), Vec::new()]);
     for seed in FIRST_SEED.. {
-        if tables[0].len() >= crate::common::flights(1, 40) as usize {
+        if tables[0].len() >= flights(1, 40) as usize {
             break;
         }
         let (scene, mut inputs) = drawn(seed);

@@ -8,7 +8,7 @@ use hzn_fuse::finding::Level;
 use hzn_fuse::flight::{Wanted, with_problem};
 use hzn_fuse::input::{Attitude, Body, Inputs};
 use hzn_fuse::results::{Epoch, Kind};
-use hzn_fuse::simulated::inputs;
+use hzn_fuse::simulated::{Errors, inputs};
 use hzn_fuse::solve::{Estimates, Loss, Problem, Role};
 use hzn_fuse::sparse::{Factor, Linear, Marginals, Normal, Pattern};
 use hzn_fuse::{Fused, Settings, fuse, truth};
@@ -72,6 +72,11 @@ fn marginals_are_those_of_the_dense_inverse() {
 
 /// Returns the inputs of a flight whose mounts, biases, clocks and limb height are drawn from the settings.
 fn drawn(seed: u64) -> (Scenario, Inputs) {
+    drawn_with(seed, &mut Slow::new(seed, 0.1))
+}
+
+/// Returns the same with other errors of the directions.
+pub(crate) fn drawn_with(seed: u64, errors: &mut dyn Errors) -> (Scenario, Inputs) {
     let mut scene = scene(seed);
     let mut draws = Draws(seed ^ 0x501e);
     for camera in &mut scene.cameras {
@@ -79,7 +84,7 @@ fn drawn(seed: u64) -> (Scenario, Inputs) {
         camera.clock.offset_s = 0.2 * draws.normal() - 0.03;
     }
     let height_km = 7.0 * draws.normal();
-    let drawn = inputs(&scene, &mut Slow::new(seed, 0.1), height_km).unwrap();
+    let drawn = inputs(&scene, errors, height_km).unwrap();
     (scene, drawn)
 }
 

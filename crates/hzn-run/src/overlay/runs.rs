@@ -6,7 +6,7 @@ use image::RgbImage;
 
 use super::canvas::Colour;
 
-/// A colour, and how much of it covers what is below, 0 to 1.
+/// A colour with its opacity, 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ink {
     /// The colour.

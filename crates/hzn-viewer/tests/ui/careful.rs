@@ -1,4 +1,4 @@
-//! Tests of what is told and kept: the same words everywhere, and nothing that a user did is lost.
+//! Tests of the window's words and of its memory. It has the same words everywhere, and loses no work of a user.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;

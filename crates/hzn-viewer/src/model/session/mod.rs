@@ -119,7 +119,7 @@ impl Session {
     pub fn saved(&self) -> &Sheet {
         &self.saved
     }
-    /// Returns the text of the file, without what was added when the pictures were opened.
+    /// Returns the text of the file. What the window added when it opened the pictures is not in it.
     pub fn on_file(&self) -> &Sheet {
         &self.on_file
     }
