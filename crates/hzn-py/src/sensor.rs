@@ -341,6 +341,8 @@ impl<'py> Read<'py> {
             let elapsed_us = processed.elapsed.as_nanos() as f64 / 1e3;
             let row = Row::from_report(&meta, found, Some(elapsed_us))
                 .with_protection(state.config.protection_factor(which as u8));
+            // The same row as `hzn run --flight` writes.
+            let row = if state.flight { row.as_sent() } else { row };
             Ok(Report::new(row, found, traces.get(which), &state.camera).with_nadir(Some(data)))
         };
         let reports = processed.iter().zip(bodies).enumerate().map(report).collect::<PyResult<Vec<_>>>()?;
