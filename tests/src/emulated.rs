@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use hzn_core::image::{Grey, Layout};
-use hzn_core::{Config, FlightHorizon, Prior};
+use hzn_core::{Config, FlightHorizon, Prior, Sensor, camera, prepared};
 use hzn_flight::answer::PictureAnswer;
 use hzn_flight::bytes::{Reader, Writer};
 use hzn_flight::{Parameters, table};
@@ -184,6 +184,20 @@ pub fn measure(board: Board, cases: &[Case]) -> Vec<Measured> {
     run(board, "measure", cases)
 }
 
+/// Runs the pictures of one sensor through the image `track` of a board, a tenth of a second apart.
+///
+/// # Panics
+/// Panics if QEMU or the image fails.
+pub fn measure_sequence(board: Board, sensor: &Config, pictures: &[Vec<u8>]) -> Vec<Measured> {
+    let case = |bytes: &Vec<u8>| Case {
+        name: String::new(),
+        sensor: sensor.clone(),
+        prior: Prior::default(),
+        bytes: bytes.clone(),
+    };
+    run(board, "track", &pictures.iter().map(case).collect::<Vec<_>>())
+}
+
 /// Runs cases of 640×480 pixels through the image `rows` of a board, row by row. Here `calls` counts making the sensor,
 /// taking all rows, and the end of the picture.
 ///
@@ -235,13 +249,34 @@ pub fn measure_rig(board: Board, heads: &[(Parameters, Vec<u8>); 4]) -> Measured
     }
 }
 
-/// Runs a picture through the image `chain` of a board and returns the eleven words of its answer. The source of the
-/// image describes them.
+/// Returns the sensor of the image `chain`: the lens of the rocket's flight, at an altitude of 150 km.
+pub fn chain_sensor() -> Config {
+    let k = [-0.055, 0.011, -0.0035, 0.0002].into_iter().collect();
+    let lens = camera::Config { k, ..camera::Config::ideal(camera::Model::KannalaBrandt, 1920, 1080, 1233.0) };
+    let mut config = Config::new(lens);
+    config.body.altitude_km = Some(150.0);
+    config
+}
+
+/// Returns [`chain_sensor`] as it is prepared, with zeros behind it, and its length in bytes.
+///
+/// # Panics
+/// Panics if the configuration is refused.
+pub fn chain_page() -> ([u8; prepared::MAX_BYTES], usize) {
+    let sensor = Sensor::<f32>::new(&chain_sensor()).expect("the configuration is right");
+    let mut page = [0; prepared::MAX_BYTES];
+    let length = sensor.prepare(&mut page).expect("the page is long enough");
+    (page, length)
+}
+
+/// Runs a picture through the image `chain` of a board, with [`chain_sensor`], and returns the eleven words of its
+/// answer. The source of the image describes them.
 ///
 /// # Panics
 /// Panics if QEMU or the image fails.
 pub fn run_chain(board: Board, picture: &[u8]) -> [u32; 11] {
-    let answer = run_picture(board, "chain", picture);
+    let (page, _) = chain_page();
+    let answer = run_files(board, "chain", &[("sensor.bin", &page), ("picture.bin", picture)]);
     let mut words = answer.as_chunks::<4>().0.iter().map(|w| u32::from_le_bytes(*w));
     std::array::from_fn(|_| words.next().expect("eleven words are written"))
 }
@@ -252,15 +287,17 @@ pub fn run_chain(board: Board, picture: &[u8]) -> [u32; 11] {
 /// # Panics
 /// Panics if QEMU or the image fails.
 pub fn run_example(picture: &[u8]) -> (Vec<u8>, u32) {
-    let mut answer = run_picture(Board::Stm32F405, "example", picture);
+    let mut answer = run_files(Board::Stm32F405, "example", &[("picture.bin", picture)]);
     let stack_bytes = answer.split_off(answer.len() - 4);
     (answer, u32::from_le_bytes(stack_bytes.try_into().expect("four bytes")))
 }
 
-/// Runs an image that reads `picture.bin` and writes `answer.bin`, and returns what it writes.
-fn run_picture(board: Board, image: &str, picture: &[u8]) -> Vec<u8> {
+/// Runs an image that reads files and writes `answer.bin`, and returns what it writes.
+fn run_files(board: Board, image: &str, files: &[(&str, &[u8])]) -> Vec<u8> {
     let dir = tempfile::tempdir().expect("a temporary folder can be made");
-    std::fs::write(dir.path().join("picture.bin"), picture).expect("the folder is writable");
+    for (name, bytes) in files {
+        std::fs::write(dir.path().join(name), bytes).expect("the folder is writable");
+    }
     let status = board.qemu(&board.image(image), 10).args(["-serial", "null"]).current_dir(dir.path()).status();
     let status = status.expect("qemu-system-arm is installed");
     assert!(status.success(), "{}: the image ended with {status}", board.name());

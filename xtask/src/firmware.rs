@@ -38,7 +38,7 @@ const BOARDS: [Board; 3] = [
     Board { name: "stm32f405", package: "hzn-stm32f405", core: M4, images: &["example", "flight"], always: &[] },
 ];
 /// Images of the boards with memory for pictures.
-const IMAGES: [&str; 7] = ["chain", "flight", "line", "measure", "nav", "rig", "rows"];
+const IMAGES: [&str; 8] = ["chain", "flight", "line", "measure", "nav", "rig", "rows", "track"];
 /// Document with the costs.
 const COSTS: &str = "book/results/firmware-cost.md";
 

@@ -99,6 +99,7 @@ pub use body::{Expected, Prior};
 pub use config::Config;
 pub use observer::{Observer, Unobserved};
 pub use papers::Preset;
+pub use pipeline::prepared;
 pub use pipeline::{
     FlightHorizon, FlightWorkspace, Horizon, HostHorizon, HostWorkspace, Sensor, SensorPlace, Sequence, Step, Tracker,
     Workspace,

@@ -22,6 +22,7 @@ mod body_defaults;
 pub mod camera_file;
 mod camera_section;
 pub mod document;
+pub mod features;
 pub mod frames;
 pub mod keys;
 pub mod limited;

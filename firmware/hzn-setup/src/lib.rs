@@ -7,6 +7,7 @@
 
 use hzn_core::body::{Expected, PriorError};
 use hzn_core::error::ConfigError;
+use hzn_core::prepared::PreparedError;
 use hzn_core::{Config, Prior, Sensor, SensorPlace};
 
 /// Same as [`Sensor::new`].
@@ -18,13 +19,13 @@ pub fn new_sensor(config: &Config) -> Result<Sensor<f32>, ConfigError> {
     Sensor::new(config)
 }
 
-/// Same as [`SensorPlace::configure`].
+/// Same as [`SensorPlace::load`].
 ///
 /// # Errors
-/// Returns the first field that is out of its limits.
+/// The bytes are not those of a sensor for this program, or they were changed.
 #[inline(never)]
-pub fn configure(place: &mut SensorPlace<f32>, config: &Config) -> Result<(), ConfigError> {
-    place.configure(config)
+pub fn load(place: &mut SensorPlace<f32>, bytes: &[u8]) -> Result<(), PreparedError> {
+    place.load(bytes)
 }
 
 /// Same as [`Sensor::expect`].

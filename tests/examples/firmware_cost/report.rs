@@ -4,7 +4,9 @@ use std::process::Command;
 
 use hzn_core::status::Stage;
 use hzn_flight::answer::PictureAnswer;
-use hzn_tests::emulated::{Board, Case, Measured, answer_bytes, measure, measure_rows, run_chain};
+use hzn_tests::emulated::{
+    Board, Case, Measured, answer_bytes, chain_page, measure, measure_rows, measure_sequence, run_chain,
+};
 use hzn_tests::flight_image::Bench;
 use hzn_tests::stack_bound::stack_bound;
 
@@ -35,8 +37,8 @@ On the Cortex-M4F, double-precision arithmetic in software takes about 9 KB more
 `expect`: `expect` calculates the cone of an altitude or a position in double precision, once per picture. No other code
 that runs per picture uses it (`cargo xtask test` checks this).
 
-The tables *in a sequence* are of the flight image with `track.full_every`: from the picture to its answer, with the
-search for stuck pixels and the comparison of memory.
+The tables *in a sequence* are with `track.full_every`. The rows of the flight image count from the picture to its answer,
+with the search for stuck pixels and the comparison of memory; those of the sensor alone count the call `Sensor::track`.
 ";
 
 /// Returns the whole report.
@@ -157,30 +159,41 @@ impl<'a> Measurement<'a> {
         let stack = "as the sensor with 600 points, plus the loop; a test limits the total to 96 KiB";
         let bound = stack_bound(&self.board.image("flight"))?.bytes;
         out += &format!("| flight | {flash} | {ram} | {stack} | {bound} |\n");
+        out += &format!(
+            "\nThe first image reads a prepared sensor, whose {} bytes are not in its flash.\n",
+            chain_page().1
+        );
         Ok(out)
     }
 }
 
-/// Returns the instructions of the flight image from a picture to its answer, with `track.full_every`.
+/// Returns the instructions of a picture with `track.full_every`: of the flight image from the picture to its answer,
+/// and of the sensor alone.
 pub(crate) fn sequence_table(board: Board, sequences: &[Sequence]) -> String {
     let head =
         "| in a sequence | full searches, mean, thousand | full searches, worst | tracked, mean | tracked, worst |";
     let mut out = format!("\n{head}\n|---|---|---|---|---|\n");
-    for sequence in sequences {
-        let answers = Bench::new(board).fly(&sequence.sensor, &sequence.pictures);
-        out += &format!("| {} |", sequence.name);
-        for wanted in [false, true] {
-            let is_tracked = |(answer, _): &&(PictureAnswer, u64)| answer.solved == 1 && answer.looks == 0;
-            let counts: Vec<u64> = answers.iter().filter(|a| is_tracked(a) == wanted).map(|a| a.1).collect();
-            let (sum, worst) = (counts.iter().sum::<u64>() as f64, counts.iter().max());
-            out += &match worst {
-                Some(&worst) => format!(" {:.0} | {:.0} |", sum / counts.len() as f64 / 1e3, worst as f64 / 1e3),
-                None => " none | none |".to_owned(),
-            };
-        }
-        out += "\n";
+    for Sequence { name, sensor, pictures } in sequences {
+        let flown = Bench::new(board).fly(sensor, pictures);
+        out += &sequence_row(&format!("{name}, flight image"), &flown);
+        let alone = measure_sequence(board, sensor, pictures).into_iter().map(|m| (m.answer, m.calls[2]));
+        out += &sequence_row(&format!("{name}, sensor alone"), &alone.collect::<Vec<_>>());
     }
     out
+}
+
+fn sequence_row(name: &str, answers: &[(PictureAnswer, u64)]) -> String {
+    let mut out = format!("| {name} |");
+    for wanted in [false, true] {
+        let is_tracked = |(answer, _): &&(PictureAnswer, u64)| answer.solved == 1 && answer.looks == 0;
+        let counts: Vec<u64> = answers.iter().filter(|a| is_tracked(a) == wanted).map(|a| a.1).collect();
+        let (sum, worst) = (counts.iter().sum::<u64>() as f64, counts.iter().max());
+        out += &match worst {
+            Some(&worst) => format!(" {:.0} | {:.0} |", sum / counts.len() as f64 / 1e3, worst as f64 / 1e3),
+            None => " none | none |".to_owned(),
+        };
+    }
+    out + "\n"
 }
 
 /// Line of the table, with instructions and work in thousands.

@@ -13,7 +13,7 @@ use hzn_flight::flight::{Buffers, Lists};
 use hzn_host::Compiled;
 use hzn_sim::flight::{Flight, leo_infrared, rocket};
 use hzn_sim::{Disc, Sky};
-use hzn_tests::emulated::{Board, Case, answer_bytes, measure, measure_rows, run_chain, run_example};
+use hzn_tests::emulated::{Board, Case, answer_bytes, chain_sensor, measure, measure_rows, run_chain, run_example};
 use hzn_tests::flight_image::{Bench, hzn_run};
 use hzn_tests::real::Photograph;
 use hzn_tests::stack_bound::stack_bound;
@@ -370,11 +370,8 @@ fn a_turn_that_never_ends_is_ended_by_the_watchdog() {
 #[test]
 #[ignore = "needs the images: cargo xtask firmware"]
 fn the_sensor_alone_answers_with_the_same_bits() {
-    // The image contains this lens and this altitude.
-    let k = [-0.055, 0.011, -0.0035, 0.0002].into_iter().collect();
-    let lens = camera::Config { k, ..camera::Config::ideal(camera::Model::KannalaBrandt, 1920, 1080, 1233.0) };
-    let mut sensor = Config::new(lens.clone());
-    sensor.body.altitude_km = Some(150.0);
+    let sensor = chain_sensor();
+    let lens = sensor.camera.clone();
     let mut flight = rocket(1920, 1080, 6, 7);
     for (i, frame) in (0..).map(f64::from).zip(&mut flight.frames) {
         frame.scene.camera = lens.clone();

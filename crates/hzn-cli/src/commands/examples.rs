@@ -66,6 +66,11 @@ hzn init --rig left right --mount 1,0,0,0 --mount 0,0,0,1   several heads, into 
 hzn migrate --dry-run scene.toml   only says what would change",
     ),
     (
+        "prepare",
+        "hzn prepare sensor.toml                      sensor.bin, for a flight computer
+hzn prepare sensor.toml -o camera-1.bin -f   with another name, replaced if it exists",
+    ),
+    (
         "evaluate",
         "hzn evaluate flight.csv --truth flight            errors, shares and covariances in words
 hzn evaluate flight.csv --truth flight -o a.html  the same, and a page with plots

@@ -21,6 +21,7 @@ mod key;
 mod lens_model;
 mod man;
 mod migrate;
+mod prepare;
 mod recover;
 mod resume;
 mod run;
@@ -80,6 +81,7 @@ enum Command {
     Simulate(simulate::Args),
     Init(init::Args),
     Migrate(migrate::Args),
+    Prepare(prepare::Args),
     Evaluate(evaluate::Args),
     #[cfg(feature = "simulator")]
     Sensitivity(Box<sensitivity::Args>),
@@ -127,6 +129,7 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Simulate(args) => simulate::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Migrate(args) => migrate::run(&args),
+        Command::Prepare(args) => prepare::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         #[cfg(feature = "simulator")]
         Command::Sensitivity(args) => sensitivity::run(&args),

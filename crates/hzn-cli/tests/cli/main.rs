@@ -37,6 +37,7 @@ mod outputs;
 mod pictures;
 mod position_input;
 mod power_cut;
+mod prepare;
 mod provenance;
 mod repeats;
 mod rerun;

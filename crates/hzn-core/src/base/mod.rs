@@ -5,6 +5,7 @@ pub mod error;
 pub mod keys;
 pub(crate) mod linalg;
 pub(crate) mod median;
+pub(crate) mod packed;
 pub mod real;
 pub(crate) mod rng;
 pub(crate) mod sort;

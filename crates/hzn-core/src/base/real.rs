@@ -7,6 +7,8 @@
 use core::fmt::{Debug, Display};
 use core::ops::Neg;
 
+use super::packed::Packed;
+
 // The trait is sealed so that no other number type can be used: the limits of the stages are derived for these two.
 mod sealed {
     pub trait Sealed {}
@@ -27,6 +29,7 @@ pub trait Real:
     + PartialOrd
     + Neg<Output = Self>
     + num_traits::NumAssign
+    + Packed
 {
     /// Converts `x` to the nearest value of this type.
     fn from_f64(x: f64) -> Self;

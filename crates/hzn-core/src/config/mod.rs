@@ -8,6 +8,7 @@ pub use numbers::SECTIONS;
 
 use crate::base::error::{ConfigError, Limit, between, require};
 use crate::base::keys::{Section, choices, section};
+use crate::base::packed::packed;
 use crate::geometry::camera;
 use crate::image::Channel;
 use crate::image::region;
@@ -103,6 +104,12 @@ impl Clone for Config {
         }
     }
 }
+
+// The two lists, which take most of the memory, are read when the configuration is in its place.
+packed!(Config {
+    camera, mount, body, input, brightness, threshold, contour, edge_points, consensus, fit, covariance, gates, retry,
+    track, limits; bodies = heapless::Vec::new(), mask = region::Config::default()
+});
 
 /// Returns a copy of a part of a configuration.
 #[inline(never)]

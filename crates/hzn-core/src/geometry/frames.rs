@@ -15,6 +15,7 @@ use core::marker::PhantomData;
 
 use crate::base::linalg::M3;
 use crate::base::linalg::V3;
+use crate::base::packed::{Packed, Packer, Unpacker};
 use crate::base::real::Real;
 
 /// Camera frame: x right, y down, z along the optical axis, out of the camera.
@@ -215,6 +216,15 @@ impl<A, B, T: Clone> Clone for Rotation<A, B, T> {
     }
 }
 impl<A, B, T: Copy> Copy for Rotation<A, B, T> {}
+
+impl<A, B, T: Real> Packed for Rotation<A, B, T> {
+    fn pack(&self, to: &mut Packer<'_>) {
+        self.rows.iter().flat_map(|row| row.iter()).for_each(|x| x.pack(to));
+    }
+    fn unpack(from: &mut Unpacker<'_>) -> Self {
+        Self { rows: <[[T; 3]; 3]>::unpack(from).map(V3::from), frames: PhantomData }
+    }
+}
 
 impl<A, B, T: Real> Rotation<A, B, T> {
     /// Makes a rotation from a quaternion, scalar first, that converts coordinates **from A to B**; the caller

@@ -2,6 +2,7 @@
 
 use crate::base::error::ConfigError;
 use crate::base::keys::{Choice, Form, Value, check_number};
+use crate::base::packed::{Packed, Packer, Unpacker};
 use crate::base::real::Real;
 
 /// The curve between light and counts. Counts and light are fractions of full scale.
@@ -46,6 +47,9 @@ impl<T: Real> Curve<T> {
         b * (half.ln() / self.gamma).exp() - self.offset
     }
 }
+
+/// The limits of a gamma. Displays and cameras have 1 to 3; a value outside of these limits is another quantity.
+const GAMMA: [f64; 2] = [0.2, 5.0];
 
 /// The words in sensor.toml, with their meanings. A number is a gamma.
 const WORDS: [(Tone, Choice); 4] = [
@@ -158,10 +162,26 @@ impl Value for Tone {
     }
     fn check(&self, path: &'static str, _low: f64, _above: bool, _high: f64) -> Result<(), ConfigError> {
         match self {
-            // Displays and cameras have 1 to 3; a value outside of these limits is another quantity.
-            Self::Gamma(gamma) => check_number(path, *gamma, 0.2, false, 5.0),
+            Self::Gamma(gamma) => check_number(path, *gamma, GAMMA[0], false, GAMMA[1]),
             _ => Ok(()),
         }
+    }
+}
+
+impl Packed for Tone {
+    fn pack(&self, to: &mut Packer<'_>) {
+        self.number(0).pack(to);
+    }
+    fn unpack(from: &mut Unpacker<'_>) -> Self {
+        let mut tone = Self::Unknown;
+        let number = f64::unpack(from);
+        // A word has a number outside of the limits of a gamma.
+        let is_taken = tone.set_number(0, number).is_some();
+        from.require(is_taken);
+        if let Self::Gamma(gamma) = tone {
+            from.limit(gamma, GAMMA[0], false, GAMMA[1]);
+        }
+        tone
     }
 }
 

@@ -1,6 +1,7 @@
 //! The sensor together with its lists: the type that most programs use.
 
 use super::place::SensorPlace;
+use super::prepared::PreparedError;
 use super::reference::Step;
 use super::sensor::Sensor;
 use super::track::Tracker;
@@ -115,6 +116,16 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
     pub fn configure(&mut self, config: &Config) -> Result<(), ConfigError> {
         self.place.configure(config)?;
         // A threshold of the old configuration may belong to another body or another scale of counts.
+        self.levels = [None; MAX_BODIES];
+        Ok(())
+    }
+    /// Makes this the sensor that [`Sensor::prepare`] wrote, from the next picture on. If the bytes are refused, nothing
+    /// changes.
+    ///
+    /// # Errors
+    /// The bytes are not those of a sensor for this program, or they were changed.
+    pub fn load(&mut self, bytes: &[u8]) -> Result<(), PreparedError> {
+        self.place.load(bytes)?;
         self.levels = [None; MAX_BODIES];
         Ok(())
     }

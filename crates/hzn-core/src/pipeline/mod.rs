@@ -17,6 +17,7 @@ mod further_looks;
 mod horizon;
 mod look;
 mod place;
+pub mod prepared;
 mod process;
 mod reference;
 mod row_stream;

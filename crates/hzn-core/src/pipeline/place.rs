@@ -1,7 +1,9 @@
 //! A place for a sensor, which is empty until a configuration is accepted.
 
+use super::prepared::{self, PreparedError};
 use super::sensor::Sensor;
 use crate::base::error::ConfigError;
+use crate::base::packed::Packed;
 use crate::base::real::Real;
 use crate::config::Config;
 use crate::geometry::camera::Camera;
@@ -55,6 +57,28 @@ impl<T: Real> SensorPlace<T> {
         self.0.clear();
         // The list has room, because it is empty.
         let _ = self.0.push(Sensor::from_checked(config, camera));
+    }
+
+    /// Makes the sensor that [`Sensor::prepare`] wrote here. If the bytes are refused, nothing changes.
+    ///
+    /// # Errors
+    /// The bytes are not those of a sensor for this program, or they were changed.
+    #[inline(never)]
+    pub fn load(&mut self, bytes: &[u8]) -> Result<(), PreparedError> {
+        prepared::check::<T>(bytes)?;
+        self.put_prepared(bytes);
+        Ok(())
+    }
+
+    /// Puts the sensor of bytes that were checked here.
+    #[inline(never)]
+    fn put_prepared(&mut self, bytes: &[u8]) {
+        self.0.clear();
+        let mut from = prepared::values(bytes);
+        let _ = self.0.push(Sensor::unpack(&mut from));
+        if let Some(sensor) = self.0.first_mut() {
+            sensor.read_lists(&mut from);
+        }
     }
 
     /// Returns the sensor; `None` if the place is empty.

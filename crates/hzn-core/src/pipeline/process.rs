@@ -19,6 +19,8 @@ use crate::stages::threshold;
 impl<T: Real> Sensor<T> {
     /// Finds the limb, with an observer. Returns a report for every input; a picture whose size is not that of the
     /// camera is `rejected` at the first stage.
+    // Inlined: the report is then made where the caller has it, and not a second time on the stack.
+    #[inline(always)]
     pub fn process<P: Pixels, O: Observer<T>, const POINTS: usize, const BLOCKS: usize, const WORDS: usize>(
         &self,
         workspace: &mut Workspace<T, POINTS, BLOCKS, WORDS>,
@@ -26,7 +28,9 @@ impl<T: Real> Sensor<T> {
         expected: &Expected<T>,
         observer: &O,
     ) -> Report<T> {
-        self.process_excluding(workspace.lists(), picture, expected, &[], observer)
+        let mut report = Report::empty();
+        self.process_excluding(workspace.lists(), picture, expected, &[], observer, &mut report);
+        report
     }
 
     /// Finds several bodies in one picture, at most [`MAX_BODIES`], one after the other in the order of `expected`, but
@@ -46,7 +50,7 @@ impl<T: Real> Sensor<T> {
         for is_free in [false, true] {
             for (one, report) in expected.iter().zip(&mut reports).filter(|(one, _)| one.free == is_free) {
                 observer.body(one.which);
-                *report = self.process_excluding(workspace.lists(), picture, one, &taken, observer);
+                self.process_excluding(workspace.lists(), picture, one, &taken, observer, report);
                 let found = report.solution.as_ref();
                 let found = found.map(FoundLimb::new);
                 // The list has room for the largest number of bodies.
@@ -56,6 +60,7 @@ impl<T: Real> Sensor<T> {
         reports
     }
 
+    /// Fills an empty report.
     fn process_excluding<P: Pixels, O: Observer<T>>(
         &self,
         lists: Lists<'_, T>,
@@ -63,13 +68,12 @@ impl<T: Real> Sensor<T> {
         expected: &Expected<T>,
         taken: &[FoundLimb<T>],
         observer: &O,
-    ) -> Report<T> {
-        let mut report = Report::empty();
+        report: &mut Report<T>,
+    ) {
         if self.has_size_of(picture) {
-            self.look_at_all(Look { lists, picture, expected, taken, observer, report: &mut report });
+            self.look_at_all(Look { lists, picture, expected, taken, observer, report });
         }
         observer.leave();
-        report
     }
 
     /// Returns whether a picture has the size of the camera. A picture of another size has another calibration, so its
@@ -129,7 +133,8 @@ impl<T: Real> Sensor<T> {
         look.observer.enter(Stage::Contour);
         let own = self.camera_for(look.expected);
         let camera = own.as_ref().unwrap_or(&self.camera);
-        let (mut search, border, marks) = Search::new(self, camera, look, work);
+        let mut search = Search::new(self, camera, look, work);
+        let (border, marks) = search.take_lists();
         match config.contour.method {
             contour::Method::Raster if cfg!(feature = "horace") => search.raster(binary, border, marks),
             contour::Method::Erode if cfg!(feature = "horace") => {

@@ -207,6 +207,8 @@ impl<T: Real> Sensor<T> {
 
     /// Returns the camera for one picture, if it differs from the camera of the sensor: it turns while the picture is
     /// read out row by row, has a temperature that changes its lens, or its rays are in the scaled space of the body.
+    // Not inlined: its temporary cameras must not be on the stack while a picture is searched.
+    #[inline(never)]
     pub(super) fn camera_for(&self, expected: &Expected<T>) -> Option<Camera<T>> {
         let rate = expected.rate_rad_s.filter(|_| self.camera.has_rolling_shutter());
         let temperature = expected.camera_temperature_c.filter(|_| self.camera.has_temperature());

@@ -11,6 +11,7 @@ mod drawn;
 mod lit_side;
 mod long;
 mod precision;
+mod prepared;
 #[cfg(all(feature = "dlr", feature = "erf", feature = "horace", feature = "zju"))]
 mod published;
 mod rig;

@@ -55,6 +55,19 @@ macro_rules! choices {
             }
         }
 
+        impl $crate::base::packed::Packed for $name {
+            fn pack(&self, to: &mut $crate::base::packed::Packer<'_>) {
+                // The number is the place in the list: one in flight is not there for every word.
+                (Self::ALL.iter().position(|choice| choice == self).unwrap_or(0) as u8).pack(to);
+            }
+            fn unpack(from: &mut $crate::base::packed::Unpacker<'_>) -> Self {
+                let place = <u8 as $crate::base::packed::Packed>::unpack(from);
+                let choice = Self::ALL.get(usize::from(place)).copied().filter(|choice| choice.lacking().is_none());
+                from.require(choice.is_some());
+                choice.unwrap_or_default()
+            }
+        }
+
         impl $crate::base::keys::Value for $name {
             const FORM: $crate::base::keys::Form = $crate::base::keys::Form::Word;
             const CHOICES: &'static [$crate::base::keys::Choice] = &[

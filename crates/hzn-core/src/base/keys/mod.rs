@@ -26,8 +26,9 @@ mod section;
 mod values;
 
 use crate::base::error::ConfigError;
+use crate::base::packed::Unpacker;
 pub(crate) use choices::choices;
-pub(crate) use notation::{check, feature_name, flight, limits, needs, option, place};
+pub(crate) use notation::{check, feature_name, flight, lacks, limit, limits, needs, option, place, unpack};
 pub(crate) use section::{section, table};
 pub(crate) use values::check_number;
 
@@ -176,6 +177,9 @@ pub trait Value: Clone + PartialEq {
     fn check(&self, _path: &'static str, _low: f64, _above: bool, _high: f64) -> Result<(), ConfigError> {
         Ok(())
     }
+    /// Refuses the bytes of a prepared sensor if a number of the value is out of its limits.
+    #[doc(hidden)]
+    fn limit(&self, _from: &mut Unpacker<'_>, _low: f64, _above: bool, _high: f64) {}
     /// Returns the number at `place` (from 0) in flight; NaN if there is none.
     fn number(&self, _place: u16) -> f64 {
         f64::NAN

@@ -85,6 +85,51 @@ macro_rules! check {
     };
 }
 
+/// Reads the value of a key from the bytes of a sensor.
+macro_rules! unpack {
+    // A large value is then made where it stays.
+    ($from:ident, $ty:ty, $default:tt, [$rule:literal], { unset $unset:literal example $example:literal }) => {
+        <$ty as $crate::base::packed::Packed>::unpack($from)
+    };
+    ($from:ident, $ty:ty, $default:tt, $limits:tt, { $($option:ident $text:literal)* }) => {{
+        let value = <$ty as $crate::base::packed::Packed>::unpack($from);
+        $crate::base::keys::limit!($from, value, $limits);
+        $crate::base::keys::lacks!($from, value, $default, $($option $text)*);
+        value
+    }};
+}
+
+/// Refuses the bytes of a sensor if a value that was read from them is out of its limits.
+macro_rules! limit {
+    ($from:ident, $value:expr, [$rule:literal]) => {};
+    ($from:ident, $value:expr, [choice]) => {};
+    ($from:ident, $value:expr, [above $low:literal]) => {
+        $crate::base::keys::Value::limit(&$value, $from, $low, true, f64::INFINITY)
+    };
+    ($from:ident, $value:expr, [above $low:literal to $high:literal]) => {
+        $crate::base::keys::Value::limit(&$value, $from, $low, true, $high)
+    };
+    ($from:ident, $value:expr, [$low:literal or more]) => {
+        $crate::base::keys::Value::limit(&$value, $from, $low, false, f64::INFINITY)
+    };
+    ($from:ident, $value:expr, [$low:literal to $high:literal]) => {
+        $crate::base::keys::Value::limit(&$value, $from, $low, false, $high)
+    };
+}
+
+/// Refuses the bytes of a sensor if a key needs a feature that is not in this build, and does not have its default.
+macro_rules! lacks {
+    ($from:ident, $value:expr, $default:tt, needs $feature:literal $($rest:tt)*) => {
+        if !cfg!(feature = $feature) {
+            $from.require($value == $default);
+        }
+    };
+    ($from:ident, $value:expr, $default:tt, $option:ident $text:literal $($rest:tt)*) => {
+        $crate::base::keys::lacks!($from, $value, $default, $($rest)*)
+    };
+    ($from:ident, $value:expr, $default:tt,) => {};
+}
+
 /// Checks that a key keeps its default when its feature is not in this build.
 macro_rules! needs {
     ($value:expr, $default:tt, $path:expr, needs $feature:literal $($rest:tt)*) => {
@@ -99,4 +144,4 @@ macro_rules! needs {
     ($value:expr, $default:tt, $path:expr,) => {};
 }
 
-pub(crate) use {check, feature_name, flight, limits, needs, option, place};
+pub(crate) use {check, feature_name, flight, lacks, limit, limits, needs, option, place, unpack};

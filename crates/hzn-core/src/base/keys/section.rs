@@ -79,6 +79,18 @@ macro_rules! table {
             )+
         }
     ) => {
+        impl $crate::base::packed::Packed for $name {
+            fn pack(&self, to: &mut $crate::base::packed::Packer<'_>) {
+                $($crate::base::packed::Packed::pack(&self.$field, to);)+
+            }
+            #[inline(never)]
+            fn unpack(from: &mut $crate::base::packed::Unpacker<'_>) -> Self {
+                Self {
+                    $($field: $crate::base::keys::unpack!(from, $ty, $default, $limits, { $($option $text)* }),)+
+                }
+            }
+        }
+
         impl $crate::base::keys::Section for $name {
             const TABLE: $crate::base::keys::Table = $crate::base::keys::Table {
                 name: $section,

@@ -2,6 +2,7 @@
 
 use super::{Choice, Form, Value};
 use crate::base::error::{ConfigError, Limit, require};
+use crate::base::packed::Unpacker;
 
 /// Checks one number. Every key calls this one copy in flash.
 #[inline(never)]
@@ -23,6 +24,9 @@ impl Value for f64 {
     fn check(&self, path: &'static str, low: f64, above: bool, high: f64) -> Result<(), ConfigError> {
         check_number(path, *self, low, above, high)
     }
+    fn limit(&self, from: &mut Unpacker<'_>, low: f64, above: bool, high: f64) {
+        from.limit(*self, low, above, high);
+    }
     fn number(&self, _place: u16) -> f64 {
         *self
     }
@@ -42,6 +46,9 @@ macro_rules! whole {
             const FORM: Form = Form::Whole;
             fn check(&self, path: &'static str, low: f64, above: bool, high: f64) -> Result<(), ConfigError> {
                 check_number(path, f64::from(*self), low, above, high)
+            }
+            fn limit(&self, from: &mut Unpacker<'_>, low: f64, above: bool, high: f64) {
+                from.limit(f64::from(*self), low, above, high);
             }
             fn number(&self, _place: u16) -> f64 {
                 f64::from(*self)
@@ -72,6 +79,11 @@ impl<T: Value> Value for Option<T> {
     fn check(&self, path: &'static str, low: f64, above: bool, high: f64) -> Result<(), ConfigError> {
         self.as_ref().map_or(Ok(()), |value| value.check(path, low, above, high))
     }
+    fn limit(&self, from: &mut Unpacker<'_>, low: f64, above: bool, high: f64) {
+        if let Some(value) = self {
+            value.limit(from, low, above, high);
+        }
+    }
     fn number(&self, place: u16) -> f64 {
         self.as_ref().map_or(f64::NAN, |value| value.number(place))
     }
@@ -98,6 +110,9 @@ impl<const N: usize> Value for [f64; N] {
     fn check(&self, path: &'static str, low: f64, above: bool, high: f64) -> Result<(), ConfigError> {
         self.iter().try_for_each(|x| check_number(path, *x, low, above, high))
     }
+    fn limit(&self, from: &mut Unpacker<'_>, low: f64, above: bool, high: f64) {
+        self.iter().for_each(|x| from.limit(*x, low, above, high));
+    }
     fn number(&self, place: u16) -> f64 {
         self.get(usize::from(place)).copied().unwrap_or(f64::NAN)
     }
@@ -112,6 +127,9 @@ impl<const N: usize> Value for heapless::Vec<f64, N> {
     const NUMBERS: u16 = N as u16;
     fn check(&self, path: &'static str, low: f64, above: bool, high: f64) -> Result<(), ConfigError> {
         self.iter().try_for_each(|x| check_number(path, *x, low, above, high))
+    }
+    fn limit(&self, from: &mut Unpacker<'_>, low: f64, above: bool, high: f64) {
+        self.iter().for_each(|x| from.limit(*x, low, above, high));
     }
     /// Returns 0 when the list ends before `place`.
     fn number(&self, place: u16) -> f64 {

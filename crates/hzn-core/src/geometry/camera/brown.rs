@@ -4,6 +4,7 @@ use super::config::Config;
 use super::ray::radial_ray;
 use crate::base::error::{ConfigError, Limit};
 use crate::base::linalg::V3;
+use crate::base::packed::packed;
 use crate::base::real::Real;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -150,3 +151,5 @@ impl<T: Real> Brown<T> {
         Some((s, [pa * ia + pb * ic, pa * ib + pb * id, pc * ia + pd * ic, pc * ib + pd * id]))
     }
 }
+
+packed!(Brown<T> { k1, k2, p1, p2, k3 });

@@ -4,6 +4,7 @@
 //! series, the check that the lens is monotone, rays, projection) is the same for all of them.
 
 use super::{double_sphere, eucm};
+use crate::base::packed::{Packed, Packer, Unpacker, packed};
 use crate::base::real::Real;
 use crate::geometry::camera::Config;
 use crate::geometry::camera::Model;
@@ -95,4 +96,20 @@ fn kannala_brandt<T: Real>(k: &[T; 4], theta: T) -> (T, T) {
         + t2 * (T::from_f64(3.0) * k1
             + t2 * (T::from_f64(5.0) * k2 + t2 * (T::from_f64(7.0) * k3 + t2 * T::from_f64(9.0) * k4)));
     (r, d)
+}
+
+packed!(Curve<T> { family, k });
+
+impl Packed for Family {
+    fn pack(&self, to: &mut Packer<'_>) {
+        (*self as u8).pack(to);
+    }
+    fn unpack(from: &mut Unpacker<'_>) -> Self {
+        let number = u8::unpack(from);
+        let is_built = |family: &Self| cfg!(feature = "kalibr") || *family == Self::KannalaBrandt;
+        let families = [Self::KannalaBrandt, Self::DoubleSphere, Self::Eucm];
+        let family = families.into_iter().filter(is_built).find(|family| *family as u8 == number);
+        from.require(family.is_some());
+        family.unwrap_or(Self::KannalaBrandt)
+    }
 }

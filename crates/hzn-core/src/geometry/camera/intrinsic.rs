@@ -44,6 +44,23 @@ impl Value for Covariance {
 }
 
 impl Intrinsic {
+    /// All parameters.
+    pub(super) const ALL: [Self; 13] = [
+        Self::FxPx,
+        Self::FyPx,
+        Self::CxPx,
+        Self::CyPx,
+        Self::K1,
+        Self::K2,
+        Self::K3,
+        Self::K4,
+        Self::P1,
+        Self::P2,
+        Self::Xi,
+        Self::Alpha,
+        Self::Beta,
+    ];
+
     /// Returns the parameter's name in sensor.toml.
     pub const fn name(self) -> &'static str {
         match self {

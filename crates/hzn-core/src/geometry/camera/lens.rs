@@ -2,6 +2,7 @@
 
 use super::{brown, radial};
 use crate::base::linalg::V3;
+use crate::base::packed::{Packed, Packer, Unpacker};
 use crate::base::real::Real;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +34,32 @@ impl<T: Real> Lens<T> {
                 let (x, y) = (s.x / s.z, s.y / s.z);
                 let (dx, dy) = lens.distort(x, y);
                 (dx, dy, brown::Brown::by_coefficients(x, y))
+            }
+        }
+    }
+}
+
+impl<T: Real> Packed for Lens<T> {
+    fn pack(&self, to: &mut Packer<'_>) {
+        match self {
+            Self::Radial(lens) => {
+                0u8.pack(to);
+                lens.pack(to);
+            }
+            Self::Pinhole => 1u8.pack(to),
+            Self::Brown(lens) => {
+                2u8.pack(to);
+                lens.pack(to);
+            }
+        }
+    }
+    fn unpack(from: &mut Unpacker<'_>) -> Self {
+        match u8::unpack(from) {
+            0 => Self::Radial(Packed::unpack(from)),
+            2 => Self::Brown(Packed::unpack(from)),
+            other => {
+                from.require(other == 1);
+                Self::Pinhole
             }
         }
     }

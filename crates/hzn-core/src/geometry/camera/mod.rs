@@ -12,6 +12,7 @@ mod equation;
 mod eucm;
 mod intrinsic;
 mod lens;
+mod packed;
 mod radial;
 pub(in crate::geometry) mod ray;
 mod shutter;
@@ -20,8 +21,7 @@ mod uncertain;
 
 pub use config::{Config, Model, Projection};
 pub use equation::{Equation, Projected};
-pub use intrinsic::INTRINSICS;
-pub use intrinsic::{Covariance, Intrinsic};
+pub use intrinsic::{Covariance, INTRINSICS, Intrinsic};
 use lens::Lens;
 pub use ray::Ray;
 use ray::radial_ray;

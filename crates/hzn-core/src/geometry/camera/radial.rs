@@ -10,6 +10,7 @@ use super::curve::Curve;
 use super::ray::radial_ray;
 use crate::base::error::{ConfigError, Limit, require};
 use crate::base::linalg::V3;
+use crate::base::packed::{Packed, Packer, Unpacker, packed};
 use crate::base::real::Real;
 use crate::geometry::block::LANES;
 
@@ -273,4 +274,30 @@ fn powers(series: &[[f64; 3]]) -> [[f64; 3]; TERMS] {
         }
     }
     sums
+}
+
+packed!(Radial<T> { curve, theta_max, r_max, inverse });
+
+impl<T: Real> Packed for Inverse<T> {
+    fn pack(&self, to: &mut Packer<'_>) {
+        match self {
+            Self::Newton => 0u8.pack(to),
+            Self::Series { scale, used, terms } => {
+                (*used as u8).pack(to);
+                scale.pack(to);
+                terms.iter().take(*used).for_each(|row| row.pack(to));
+            }
+        }
+    }
+    fn unpack(from: &mut Unpacker<'_>) -> Self {
+        let used = usize::from(u8::unpack(from));
+        if used == 0 {
+            return Self::Newton;
+        }
+        from.require(used <= TERMS);
+        let scale = T::unpack(from);
+        let mut terms = [[T::ZERO; 3]; TERMS];
+        terms.iter_mut().take(used).for_each(|row| *row = Packed::unpack(from));
+        Self::Series { scale, used: used.min(TERMS), terms }
+    }
 }

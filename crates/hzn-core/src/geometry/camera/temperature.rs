@@ -6,6 +6,7 @@
 use super::intrinsic::INTRINSICS;
 use crate::base::error::{ConfigError, between};
 use crate::base::keys::{Form, Value};
+use crate::base::packed::packed;
 use crate::base::real::Real;
 
 /// Largest change of the focal lengths, and of the principal point in focal lengths.
@@ -97,3 +98,5 @@ pub(super) fn mode<T: Real>(lens: Option<Temperature>, [fx, fy]: [f64; 2]) -> Op
     mode.iter_mut().zip(of_lens).for_each(|(slot, value)| *slot = T::from_f64(value));
     Some(mode)
 }
+
+packed!(Temperature { reference_c, focal_ppm_per_k, cx_px_per_k, cy_px_per_k, untold_sigma_k });

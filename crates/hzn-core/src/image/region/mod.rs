@@ -10,6 +10,7 @@ pub(crate) use ring::Run;
 
 use crate::base::error::{ConfigError, Limit, between, require};
 use crate::base::keys::section;
+use crate::base::packed::packed;
 use crate::base::real::Real;
 use crate::geometry::camera::{self, Camera};
 use crate::geometry::crop::Crop;
@@ -132,6 +133,8 @@ impl<T: Real> Region<T> {
 
     /// Returns the region without a frame of `px` pixels along each side of the picture. The frame must be narrower
     /// than half of the picture.
+    // Not inlined: the copy is then made where it stays.
+    #[inline(never)]
     pub(crate) fn without_frame(&self, px: u16) -> Self {
         Self { frame: px, ..self.clone() }
     }
@@ -312,8 +315,8 @@ impl<T: Real> Region<T> {
         // A region always has columns. The `max` repeats this, so that the compiler sees that `clamp` cannot fail.
         let (first, last) = (i32::from(first), i32::from(last.max(first)));
         // The search starts one pixel inside and grows while the exact test holds: the ring and `contains` must agree.
-        let mut x0 = ((c.cx - half).floor().to_i32() + 2).clamp(first, last);
-        let mut x1 = ((c.cx + half).floor().to_i32() - 1).clamp(first, last);
+        let mut x0 = (c.cx - half).floor().to_i32().saturating_add(2).clamp(first, last);
+        let mut x1 = (c.cx + half).floor().to_i32().saturating_sub(1).clamp(first, last);
         if x0 > x1 {
             let mid = c.cx.to_i32().clamp(first, last);
             (x0, x1) = (mid, mid);
@@ -359,6 +362,9 @@ impl<T: Real> Circle<T> {
         dx * dx + dy * dy > T::one()
     }
 }
+
+packed!(Region<T> { width, height, frame, circle, blind, polygons });
+packed!(Circle<T> { cx, cy, semi_x, inv_x, inv_y });
 
 #[cfg(test)]
 mod tests {

@@ -1,5 +1,6 @@
 //! A masked polygon.
 
+use crate::base::packed::packed;
 use crate::base::real::Real;
 
 /// Maximum number of corners of one polygon.
@@ -77,3 +78,5 @@ impl<T: Real> Outline<T> {
         inside
     }
 }
+
+packed!(Outline<T> { low, high, corners });

@@ -306,7 +306,8 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
             let own = self.sensor.camera_for(self.expected);
             let camera = own.as_ref().unwrap_or(&self.sensor.camera);
             let look = Look { lists, picture: &picture, expected: self.expected, taken: &[], observer, report };
-            let (mut search, border, marks) = Search::new(self.sensor, camera, look, work);
+            let mut search = Search::new(self.sensor, camera, look, work);
+            let (border, marks) = search.take_lists();
             search.border_following(&binary, border, marks);
             search.conclude();
         }

@@ -65,7 +65,15 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         if !self.observer.wants(number) {
             return;
         }
-        let (outcome, solution) = self.candidate(binary, number, length, edge.pixels());
+        let mut outcome = Candidate {
+            number,
+            length_px: length,
+            points: 0,
+            inliers: 0,
+            rms_px: T::from_f64(f64::NAN),
+            verdict: Verdict::NoConsensus,
+        };
+        let solution = self.candidate(binary, edge.pixels(), &mut outcome);
         self.observer.verdict(number, &outcome, solution.as_ref().map(|b| &b.solution));
         if let Some(new) = solution {
             self.keep_better(new);
@@ -81,25 +89,14 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
     fn candidate<P: Pixels>(
         &mut self,
         binary: &BinaryPicture<'_, T, P, O>,
-        number: u32,
-        length: u32,
         border: &[Pixel],
-    ) -> (Candidate<T>, Option<Best<T>>) {
-        let mut outcome = Candidate {
-            number,
-            length_px: length,
-            points: 0,
-            inliers: 0,
-            rms_px: T::from_f64(f64::NAN),
-            verdict: Verdict::NoConsensus,
-        };
-        let best = self.locate_points(binary, border, &mut outcome).and_then(|points| {
-            let clipped = T::from_i32(points.clipped as i32) / T::from_i32(points.count.max(1) as i32);
-            let expected = self.expected.clipped(clipped);
-            let (fit, threshold) = self.fit(&points, &expected, &mut outcome)?;
-            self.judge(binary, &points, &expected, &fit, threshold, &mut outcome)
-        });
-        (outcome, best)
+        outcome: &mut Candidate<T>,
+    ) -> Option<Best<T>> {
+        let points = self.locate_points(binary, border, outcome)?;
+        let clipped = T::from_i32(points.clipped as i32) / T::from_i32(points.count.max(1) as i32);
+        let expected = self.expected.clipped(clipped);
+        let (fit, threshold) = self.fit(&points, &expected, outcome)?;
+        self.judge(binary, &points, &expected, &fit, threshold, outcome)
     }
 
     /// Locates the edge points. The caller has paid for them; the extra work of slow points is charged here.

@@ -66,13 +66,11 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         // The best answer is put aside, so that it does not compete with the joined edge, of which it is a part.
         let before = self.best.take();
         self.judge_edge(binary, &edge);
-        let joined = self.best.take();
-        self.best = match (before, joined) {
-            (Some(before), Some(joined)) if is_better(&joined, &before) => {
-                Some(Best { certain: joined.certain || before.certain, ..joined })
-            }
-            (before, _) => before,
-        };
+        match (before, &mut self.best) {
+            // The joined answer stays where it is, because an answer takes more than half a kilobyte of stack.
+            (Some(before), Some(joined)) if is_better(joined, &before) => joined.certain |= before.certain,
+            (before, best) => *best = before,
+        }
         self.work.charge(binary.cost());
     }
 }

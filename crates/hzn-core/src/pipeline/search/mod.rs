@@ -42,6 +42,9 @@ pub(super) struct Search<'a, T, O> {
     min_points: u16,
     observer: &'a O,
     blocks: &'a mut [Block<T>],
+    /// See [`Self::take_lists`].
+    border: &'a mut [Pixel],
+    marks: &'a mut [u32],
     /// The rest of the work budget.
     work: WorkBudget,
     best: Option<Best<T>>,
@@ -71,17 +74,19 @@ struct Best<T> {
 }
 
 impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
-    /// Begins a search, and returns it with the lists for the border and the marks of the edges. `camera` is the camera
-    /// of the sensor or [`Sensor::camera_for`], and `work` is the work budget of the look.
+    /// Begins a search. `camera` is the camera of the sensor or [`Sensor::camera_for`], and `work` is the work budget of
+    /// the look.
+    // Inlined and returned alone: the search is then made where it stays.
+    #[inline(always)]
     pub(super) fn new<P>(
         sensor: &'a Sensor<T>,
         camera: &'a Camera<T>,
         look: Look<'a, T, P, O>,
         work: WorkBudget,
-    ) -> (Self, &'a mut [Pixel], &'a mut [u32]) {
+    ) -> Self {
         let Look { lists: Lists { border, blocks, marks }, expected, taken, observer, report, .. } = look;
         let config = &sensor.config;
-        let search = Self {
+        Self {
             expected,
             taken,
             noise: config.noise_model_of(expected.which),
@@ -102,8 +107,14 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
             report,
             camera,
             sensor,
-        };
-        (search, border, marks)
+            border,
+            marks,
+        }
+    }
+
+    /// Takes the lists for the border and the marks of the edges out of the search.
+    pub(super) fn take_lists(&mut self) -> (&'a mut [Pixel], &'a mut [u32]) {
+        (core::mem::take(&mut self.border), core::mem::take(&mut self.marks))
     }
 
     /// Returns the rule that chooses among the edges.
@@ -139,7 +150,7 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
     /// Keeps the better of two answers. If they point in different directions, the score of the other is kept as the
     /// rival's.
     fn keep_better(&mut self, new: Best<T>) {
-        let Some(old) = self.best.take() else {
+        let Some(old) = &mut self.best else {
             self.best = Some(new);
             return;
         };
@@ -150,20 +161,20 @@ impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
             T::from_f64(AMBIGUOUS_DEG.to_radians())
         };
         let apart = new.solution.axis.angle_rad(&old.solution.axis) > limit;
-        let (better, other) = if new.score < old.score { (new, old) } else { (old, new) };
+        let rival = if new.score < old.score { core::mem::replace(old, new).score } else { new.score };
         if apart {
-            self.rival = Some(self.rival.map_or(other.score, |r| r.min(other.score)));
+            self.rival = Some(self.rival.map_or(rival, |r| r.min(rival)));
         }
-        self.best = Some(better);
     }
 
     /// Writes the answer into the report. Returns the rest of the work budget.
-    pub(super) fn conclude(self) -> WorkBudget {
+    // The search is not moved, and the answer is copied once.
+    pub(super) fn conclude(&mut self) -> WorkBudget {
         let can_be_ambiguous = self.choice() == gates::Choice::Score;
-        let (report, work) = (self.report, self.work);
+        let (report, work) = (&mut *self.report, self.work);
         report.counters.work = work.spent();
         report.counters.looks += 1;
-        if let Some(best) = self.best {
+        if let Some(best) = &self.best {
             let factor = T::from_f64(AMBIGUOUS_SCORE);
             let is_close = |rival: T| rival < best.score * factor || self.expected.free;
             if can_be_ambiguous && !best.certain && self.rival.is_some_and(is_close) {

@@ -214,7 +214,8 @@ impl<T: Real> Sensor<T> {
         let limb = self.limb(camera, axis, expected);
         let binary = self.binary(&look, threshold.level, threshold.contrast);
         let work = budget::new(&self.config, look.lists.border.len());
-        let (mut search, border, _) = Search::new(self, camera, look, work);
+        let mut search = Search::new(self, camera, look, work);
+        let (border, _) = search.take_lists();
         let mut cost = 0;
         let found = self.find_border(&limb, &binary, border, &mut cost);
         search.charge(cost);
