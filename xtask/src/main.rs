@@ -8,8 +8,8 @@
 //! cargo xtask firmware   builds the images for the flight computer and counts their instructions
 //! cargo xtask campaign   looks for faults: fuzzing, killed runs, long runs
 //! cargo xtask dist       makes the files of a release: archive, Debian package, wheel, lists of parts, checksums
-//! cargo xtask keys       writes the files that follow from the keys of sensor.toml: table, template, JSON schema,
-//!                        types of Python
+//! cargo xtask keys       writes the files that follow from the keys of sensor.toml: table, template, types of Python,
+//!                        and the JSON schemas of sensor.toml, frames.csv and scene.toml
 //! cargo xtask first-command
 //!                        measures what the README's first command costs on a clean clone
 //! cargo xtask pictures   makes the documents' pictures with overlays
@@ -76,8 +76,8 @@ const USAGE: &str = "usage: cargo xtask COMMAND [OPTION]...; COMMAND is one of t
                      --by-feature prints only how much flash the methods of published systems take
   first-command      clones the committed state, runs the README's first command there, and prints its wall time and
                      processor time; what cargo downloads is downloaded before and not counted
-  keys               writes the tables of book/reference/sensor-toml.md, the template, the JSON schema and the
-                     Python types (hzn.keys) from the keys in hzn-core
+  keys               writes the tables of book/reference/sensor-toml.md, the template and the Python types (hzn.keys)
+                     from the keys in hzn-core, and the JSON schemas of sensor.toml, frames.csv and scene.toml
   page               builds the page with the sensor in the browser into target/xtask/page
   pictures           makes the documents' pictures with overlays again: those of the gallery, the photograph on the
                      first page, and the map of a lens; needs ffmpeg
@@ -132,8 +132,12 @@ fn build_site() -> Result<(), String> {
     Ok(())
 }
 
-/// Writes the documents that are derived from the keys of sensor.toml.
+/// Writes the documents that are derived from keys of sensor.toml and scene.toml, and from columns of frames.csv.
 fn write_keys() -> Result<(), String> {
-    let mut cargo = steps::cargo(&["run", "--quiet", "-p", "hzn-files", "--example", "keys", "--", "."]);
-    steps::run(&mut cargo).map_err(steps::Trouble::into_message)
+    let run = |args: &[&str]| {
+        let mut cargo = steps::cargo(&[&["run", "--quiet"], args, &["--", "."]].concat());
+        steps::run(&mut cargo).map_err(steps::Trouble::into_message)
+    };
+    run(&["-p", "hzn-files", "--example", "keys"])?;
+    run(&["-p", "hzn-sim", "--features", "schema", "--example", "schema"])
 }

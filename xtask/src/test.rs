@@ -181,7 +181,9 @@ fn read_files_with_other_readers(steps: &mut Steps) -> Outcome {
     let mut files = find_recordings(&demo_dir());
     files.push(sample);
     steps::run(Command::new(&python).arg("tests/python/check_mcap.py").args(files))?;
-    for (script, folder) in [("check_rewritten.py", "rewritten"), ("check_ros.py", "ros")] {
+    for (script, folder) in
+        [("check_rewritten.py", "rewritten"), ("check_ros.py", "ros"), ("check_schemas.py", "schemas")]
+    {
         let folder = target().join("xtask").join(folder);
         if folder.exists() {
             fs::remove_dir_all(&folder)?;

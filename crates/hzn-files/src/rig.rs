@@ -54,6 +54,7 @@ impl Rig {
 
 /// `[rig]`: what all heads share.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Common {
     /// Longest time between two pictures of one epoch, seconds.
@@ -109,6 +110,7 @@ impl Common {
 
 /// `[rig.mount]`: the attitude of the rig on the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct RigMount {
     /// Quaternion that converts coordinates of the rig to coordinates of the vehicle, scalar first.

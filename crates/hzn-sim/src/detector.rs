@@ -8,6 +8,7 @@ use crate::picture::{Picture, Samples};
 
 /// The detector, and the blur of the optics in front of it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Detector {
     /// Standard deviation of the Gaussian point spread function in pixels; 0 means no blur.
@@ -35,6 +36,7 @@ pub struct Detector {
 
 /// Curve from light to brightness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Tone {
     /// Brightness is proportional to light.

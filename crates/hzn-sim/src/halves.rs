@@ -7,6 +7,7 @@ use crate::pose::Pose;
 
 /// Pixels of the two half pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
     /// Like the fields of a chess board: neighbouring pixels are in different halves.

@@ -22,6 +22,7 @@ use std::sync::Arc;
 
 /// The world that an infrared camera sees.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Infrared {
     /// Season as an angle in degrees: 0 is northern midsummer, 90 autumn, 180 midwinter. Without it, a scene.toml takes
@@ -35,6 +36,7 @@ pub struct Infrared {
     /// Band whose name sensor.toml has as `body.limb` (`window-8-14um` or `co2-15um`), in place of the height of this
     /// world: the sensor then knows the limb as well as that of a real flight.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(schema_with = "crate::foreign_schema::limb"))]
     pub limb: Option<Limb>,
     /// Mean tangent height at which half of the disc's brightness is left, kilometres.
     pub half_level_km: f64,

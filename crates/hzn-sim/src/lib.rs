@@ -39,6 +39,8 @@ pub mod ellipsoid;
 pub mod error;
 pub mod flight;
 pub mod foreground;
+#[cfg(feature = "schema")]
+mod foreign_schema;
 pub mod globe;
 pub mod halves;
 mod height;

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Imperfections of the lens; a perfect lens has only zeros. Stray light is drawn only in worlds with a visible Sun.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Optics {
     /// Share of the light that is lost in the corner farthest from the principal point, 0 to 1. Between the principal

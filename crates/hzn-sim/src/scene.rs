@@ -79,6 +79,7 @@ fn one() -> f64 {
 
 /// Kind of world in front of the camera.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum World {
     /// A body of uniform brightness with clouds and a band, described by `profile`, `disc`, `light` and `sky`. It is

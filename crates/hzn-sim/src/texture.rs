@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// Bright clouds over a darker surface.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Clouds {
     /// Approximate share of the ground under clouds, 0 to 1.

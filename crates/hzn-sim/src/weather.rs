@@ -8,6 +8,7 @@ use crate::counter::{Counter, Stream};
 /// A random field of the limb height that is added to the height by latitude. It is normal, and stands still over the
 /// Earth while the pictures are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Weather {
     /// 1σ of the height, kilometres.

@@ -141,6 +141,11 @@ hzn telemetry udp:0.0.0.0:5006,10.0.0.1:5005 --screen   a line, on the whole ter
         "hzn view flight/          the pictures of a folder, with their edges and points
 hzn view flight.mcap      a recording",
     ),
+    ),
+    (
+        "schema",
+        "hzn schema sensor.toml > sensor.schema.json   for an editor of sensor.toml
+hzn schema scene.toml > scene.schema.json     for one of scene.toml",
     (
         "completions",
         "source <(hzn completions bash)            in ~/.bashrc

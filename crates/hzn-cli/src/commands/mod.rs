@@ -26,6 +26,7 @@ mod recover;
 mod resume;
 mod run;
 #[cfg(feature = "simulator")]
+mod schema;
 mod sensitivity;
 #[cfg(feature = "simulator")]
 mod simulate;
@@ -94,6 +95,7 @@ enum Command {
     Telecommand(telecommand::Args),
     View(view::Args),
     Completions(completions::Args),
+    Schema(schema::Args),
     Man(man::Args),
 }
 
@@ -142,6 +144,7 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Telecommand(args) => telecommand::run(&args),
         Command::View(args) => view::run(&args),
         Command::Completions(args) => completions::run(&args, command()),
+        Command::Schema(args) => schema::run(&args),
         Command::Man(args) => man::run(&args, command()),
     }
 }

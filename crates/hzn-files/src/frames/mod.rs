@@ -16,11 +16,13 @@
 //! | `camera_temperature_c` | temperature of the camera, °C: `camera.temperature` |
 
 mod check;
+mod columns;
 mod data;
 mod inertial;
 mod names;
 mod read;
 
 pub use check::altitude_at_km;
+pub use columns::{COLUMNS, schema};
 pub use data::{FrameData, Frames, Orientation, Unused};
-pub use read::{COLUMNS, load, load_for, load_vehicle, parse, parse_vehicle};
+pub use read::{load, load_for, load_vehicle, parse, parse_vehicle};

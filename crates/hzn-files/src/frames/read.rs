@@ -7,6 +7,7 @@ use std::path::Path;
 use csv::StringRecord;
 use hzn_core::body::Kind;
 
+use super::columns::{ATTITUDE, COLUMNS, POLE, POSITION, RATE, SUN};
 use super::data::{FrameData, Frames, Orientation, plain_name};
 use super::names;
 use crate::nearest::nearest;
@@ -14,34 +15,6 @@ use crate::quoted::quoted;
 use crate::separator::separator_hint;
 use crate::unix_lines::UnixLines;
 use crate::{Problem, limited, time};
-
-/// Names of the columns that are read.
-pub const COLUMNS: &[&str] = &[
-    "file",
-    "time_s",
-    "utc",
-    "altitude_km",
-    "x_km",
-    "y_km",
-    "z_km",
-    "qw",
-    "qx",
-    "qy",
-    "qz",
-    "attitude_sigma_deg",
-    "sun_x",
-    "sun_y",
-    "sun_z",
-    "rate_x",
-    "rate_y",
-    "rate_z",
-    "pole_x",
-    "pole_y",
-    "pole_z",
-    "range_km",
-    "range_sigma_km",
-    "camera_temperature_c",
-];
 
 /// Returns the name under which a column is kept, for a known column and for those of a further body: `q_BODY_w` to
 /// `q_BODY_z` and `pole_BODY_x` to `pole_BODY_z`, with the name of a kind of body.
@@ -311,19 +284,19 @@ impl<'a> Row<'a> {
             time_s: self.number("time_s")?,
             utc_s: self.utc()?,
             altitude_km: self.number("altitude_km")?,
-            position_km: self.vector(["x_km", "y_km", "z_km"])?,
-            q_fixed_from_camera_wxyz: self.vector(["qw", "qx", "qy", "qz"])?,
+            position_km: self.vector(POSITION)?,
+            q_fixed_from_camera_wxyz: self.vector(ATTITUDE)?,
             attitude_sigma_deg: self.number("attitude_sigma_deg")?,
-            sun_camera: self.vector(["sun_x", "sun_y", "sun_z"])?,
-            rate_rad_s: self.vector(["rate_x", "rate_y", "rate_z"])?,
-            pole_camera: self.vector(["pole_x", "pole_y", "pole_z"])?,
+            sun_camera: self.vector(SUN)?,
+            rate_rad_s: self.vector(RATE)?,
+            pole_camera: self.vector(POLE)?,
             range_km: self.number("range_km")?,
             range_sigma_km: self.number("range_sigma_km")?,
             camera_temperature_c: self.number("camera_temperature_c")?,
             other_bodies: self.other_bodies()?,
         };
-        self.check_direction("sun_x, sun_y, sun_z", data.sun_camera)?;
-        self.check_direction("pole_x, pole_y, pole_z", data.pole_camera)?;
+        self.check_direction(&SUN.join(", "), data.sun_camera)?;
+        self.check_direction(&POLE.join(", "), data.pole_camera)?;
         Ok(data)
     }
 

@@ -9,6 +9,7 @@ use super::surface::Surface;
 
 /// A body in sunlight, in front of a dark sky.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Ellipsoid {
     /// Name of a planet or moon whose radii are known ([`hzn_nav::planets`]). Give either the name or `radii_km`.

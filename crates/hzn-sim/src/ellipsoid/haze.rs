@@ -6,6 +6,7 @@ use crate::visible::Air;
 
 /// `[world.ellipsoid.haze]`: a layer whose density falls as exp(−height/scale height) above the surface.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Haze {
     /// Height over which the density falls by e, kilometres.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// `[[world.ellipsoid.rings]]`: a ring between two radii. It hides what is behind it; it casts no shadow and gets none.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Ring {
     /// Inner radius, kilometres.

@@ -8,6 +8,7 @@ use crate::texture::{CellCache, Relief};
 /// Law of reflection: brightness by the cosines of the angles of the Sun (μ₀) and of the camera (μ) from the vertical.
 /// Each law has the value 1 at μ₀ = μ = 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Reflection {
     /// A matt surface: μ₀. At full phase it darkens to zero at the limb.
@@ -21,6 +22,7 @@ pub enum Reflection {
 
 /// `[world.ellipsoid.surface]`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Surface {
     /// Brightness under the Sun at the zenith, seen from the zenith.

@@ -13,6 +13,7 @@ use crate::trajectory::Path;
 
 /// `[clock]`: the clock of a camera. A picture that is taken at t gets the time stamp t + offset + latency + jitter.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Clock {
     /// Time of the camera's clock minus that of the vehicle, seconds.
@@ -32,6 +33,7 @@ impl Clock {
 
 /// `[fault]`: what goes wrong with a camera in flight. sensor.toml and rig.toml do not know of it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Fault {
     /// Time from which the camera repeats its last picture before it, seconds; the truth of such a picture is that of
@@ -61,11 +63,13 @@ impl Fault {
 
 /// `[[cameras]]`: one of several cameras on a vehicle. Lens, bodies and times are those of the scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CameraOnVehicle {
     /// Short name: that of the folder, and the beginning of the names of its pictures.
     pub name: String,
     /// The told attitude of the camera on the vehicle.
+    #[cfg_attr(feature = "schema", schemars(schema_with = "crate::foreign_schema::mount"))]
     pub mount: Mount,
     /// Angle between the true mount and the told one, 1-sigma about each axis, degrees.
     #[serde(default, skip_serializing_if = "super::is_zero")]

@@ -11,16 +11,29 @@ use crate::texture::Clouds;
 use crate::visible::Visible;
 
 /// A key, its value, and the smallest and largest allowed value.
-struct Limit(String, f64, [f64; 2]);
+pub(super) struct Limit(String, f64, [f64; 2]);
 
 /// No upper limit.
 const UNLIMITED: f64 = f64::INFINITY;
 /// Lower limit "above 0", for divisors.
-const ABOVE_ZERO: f64 = 1e-9;
+pub(super) const ABOVE_ZERO: f64 = 1e-9;
 
 impl Limit {
     fn new(key: impl Into<String>, value: f64, range: [f64; 2]) -> Self {
         Self(key.into(), value, range)
+    }
+
+    /// Returns the words of the key, for example `world`, `visible`, `air` and `brightness`.
+    #[cfg(feature = "schema")]
+    pub(super) fn path(&self) -> Vec<String> {
+        let words = self.0.split(|c: char| "[]. ".contains(c));
+        words.filter(|word| !word.is_empty()).map(str::to_owned).collect()
+    }
+
+    /// Returns the smallest and the largest allowed value.
+    #[cfg(feature = "schema")]
+    pub(super) fn range(&self) -> [f64; 2] {
+        self.2
     }
 
     fn check(self) -> Result<(), ScenarioError> {
@@ -116,9 +129,9 @@ impl Scenario {
     }
 
     /// Returns the limits of single numbers, in the order of the file.
-    fn limits(&self) -> Vec<Limit> {
+    pub(super) fn limits(&self) -> Vec<Limit> {
         let share = [0.0, 1.0];
-        let Self { capture, optics, shutter, exposure, detector, known, .. } = self;
+        let Self { capture, optics, shutter, exposure, detector, known, fault, .. } = self;
         let mut all = vec![
             Limit::new("[capture] frames", capture.frames.into(), [1.0, 1e5]),
             Limit::new("[capture] jpeg_quality", capture.jpeg_quality.into(), [1.0, 100.0]),
@@ -144,11 +157,6 @@ impl Scenario {
             Limit::new("mount_error_deg", self.mount_error_deg, [0.0, 45.0]),
             Limit::new("[clock] offset_s", self.clock.offset_s, [-1e6, 1e6]),
             Limit::new("[clock] latency_s", self.clock.latency_s, [0.0, 1e3]),
-            Limit::new(
-                "[fault] turn_deg",
-                self.fault.turn_deg.iter().fold(0.0, |most, x| x.abs().max(most)),
-                [0.0, 180.0],
-            ),
             Limit::new("[fault] turn_from_s", self.fault.turn_from_s, [-1e7, 1e7]),
             Limit::new("[fault] frozen_from_s", self.fault.frozen_from_s.unwrap_or_default(), [-1e7, 1e7]),
             Limit::new("[fault] late_s", self.fault.late_s, [-1e3, 1e3]),
@@ -157,6 +165,7 @@ impl Scenario {
             Limit::new("[known] range_sigma_km", known.range_sigma_km.unwrap_or(1.0), [ABOVE_ZERO, UNLIMITED]),
             Limit::new("[known] attitude_sigma_deg", known.attitude_sigma_deg.unwrap_or(1.0), [ABOVE_ZERO, 180.0]),
         ];
+        all.extend(fault.turn_deg.map(|deg| Limit::new("[fault] turn_deg", deg, [-180.0, 180.0])));
         for part in &self.vehicle {
             all.push(Limit::new("[[vehicle]] brightness", part.brightness, [0.0, UNLIMITED]));
             let corners = part.polygon_px.iter().flatten();

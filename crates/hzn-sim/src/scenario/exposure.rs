@@ -7,6 +7,7 @@ use crate::scene::Scene;
 
 /// `[exposure]`: a fixed gain, or a controller that follows the mean brightness with a lag.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Exposure {
     /// Factor on the light. It has no effect if `target_mean` is set.

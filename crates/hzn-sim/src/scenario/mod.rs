@@ -12,6 +12,8 @@ mod fly;
 mod noise;
 mod planet;
 mod rig;
+#[cfg(feature = "schema")]
+pub mod schema;
 mod view;
 
 pub use cameras::{CameraOnVehicle, Clock, Fault};
@@ -109,8 +111,12 @@ pub const BUILTIN: [(&str, &str, &str); 16] = [
     ),
 ];
 
+/// The JSON schema of scene.toml, which `scenario::schema` makes of the structures below and `cargo xtask keys` writes.
+pub const SCHEMA: &str = include_str!("scene.schema.json");
+
 /// A simulated sequence.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
     /// Short name; the names of the pictures begin with it.
@@ -119,21 +125,26 @@ pub struct Scenario {
     #[serde(default = "one")]
     pub seed: u64,
     /// UTC of time 0, as a TOML date and time. It sets the positions of Sun and Moon, and the season.
+    #[cfg_attr(feature = "schema", schemars(with = "String"))]
     pub utc: toml::value::Datetime,
     /// Bodies that the sensor looks for and that truth.csv lists: `earth`, `sun`, `moon`. A scene with
     /// `[world.ellipsoid]` has that body only.
     #[serde(default = "earth")]
+    #[cfg_attr(feature = "schema", schemars(schema_with = "crate::foreign_schema::bodies"))]
     pub bodies: Vec<Kind>,
     /// Times and file format of the pictures.
     pub capture: Capture,
     /// The lens and the size of the picture, as in sensor.toml.
+    #[cfg_attr(feature = "schema", schemars(schema_with = "crate::foreign_schema::camera"))]
     pub camera: camera::Config,
     /// Attitude of the camera on the vehicle, as in sensor.toml.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(schema_with = "crate::foreign_schema::mount"))]
     pub mount: Option<Mount>,
     /// Told attitude on the vehicle of the camera that `attitude` describes (`pointing`, `towards`, `aimed`, `table`).
     /// Without it, that is the first of `cameras`, or the camera of `mount`. [`Scenario::by_camera`] sets it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(schema_with = "crate::foreign_schema::mount"))]
     pub attitude_mount: Option<Mount>,
     /// Angle between the true mount of the camera and the told one, 1-sigma about each axis, degrees.
     #[serde(default, skip_serializing_if = "is_zero")]
@@ -201,6 +212,7 @@ fn earth() -> Vec<Kind> {
 
 /// `[capture]`: times and file format of the pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Capture {
     /// Time of the first picture, seconds from time 0.
@@ -224,6 +236,7 @@ fn quality() -> u8 {
 
 /// Format of the pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
     /// Lossless; 8 or 16 bits.
@@ -245,6 +258,7 @@ impl Format {
 
 /// `[shutter]`: exposure and readout time of a picture. If both are zero, a picture takes no time.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Shutter {
     /// Exposure time of a row, seconds.
@@ -261,6 +275,7 @@ pub struct Shutter {
 
 /// `[[vehicle]]`: a part of the vehicle in the picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Part {
     /// Corners (x, y) in pixels; the last corner is joined to the first.
@@ -274,6 +289,7 @@ pub struct Part {
 
 /// `[known]`: errors of the prior in frames.csv and sensor.toml.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Known {
     /// 1-sigma error of every component of the position, kilometres.

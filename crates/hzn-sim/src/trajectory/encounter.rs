@@ -9,6 +9,7 @@ use crate::counter::{Counter, Stream};
 /// The place of the camera in the body-fixed frame, and the side from which the Sun shines. Each pair has the values of
 /// the first and the last picture. The range changes by equal factors in equal times, the angles change evenly.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Encounter {
     /// Distance from the camera to the centre of the body, kilometres.

@@ -8,6 +8,7 @@ use crate::counter::{Counter, Stream};
 
 /// An inertial measurement unit in the vehicle's axes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Imu {
     /// Samples per second.
@@ -86,6 +87,7 @@ pub struct ImuRow {
 
 /// A satellite navigation receiver.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Gnss {
     /// Fixes per second.

@@ -13,6 +13,7 @@ use hzn_nav::ephemeris;
 
 /// An orbit, given by its elements at time 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Orbit {
     /// Height of the perigee above the mean radius (6371 km), kilometres.

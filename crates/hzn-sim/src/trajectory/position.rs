@@ -12,6 +12,7 @@ use super::table::{Table, TableRows};
 
 /// The trajectory of the vehicle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Trajectory {
     /// A sounding rocket; time 0 is lift-off.

@@ -12,6 +12,7 @@ use hzn_nav::ephemeris;
 
 /// The ascent. The acceleration of the stages follows from the apogee.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Rocket {
     /// Geodetic latitude of the pad, degrees.

@@ -12,6 +12,7 @@ use super::point::Point;
 /// Rows of a CSV file with the columns `time_s, x_km, y_km, z_km` (ECEF). For `attitude = "table"` it also has
 /// `qw, qx, qy, qz` (camera to ECEF). Between rows, positions follow a smooth cubic and attitudes the shortest turn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Table {
     /// Path of the file, relative to the scene.toml.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// The atmosphere. Its optical depth falls as exp(−height/scale height) in every channel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Air {
     /// Optical depth from the ground to the zenith, for red, green and blue.

@@ -13,6 +13,7 @@ use crate::texture::{CellCache, Relief, smoothstep};
 
 /// The ground without its clouds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Ground {
     /// Approximate share of land, 0 to 1.

@@ -18,6 +18,7 @@ use crate::texture::Clouds;
 /// The world that a camera for visible light sees. The scene's `light` sets the direction of the Sun. If it is not
 /// `Light::Sun`, the Sun is at the camera's zenith.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Visible {
     /// Draws the Sun's disc with its bloom, glare and ghosts if it is in view.

@@ -11,6 +11,7 @@ use crate::pose::Pose;
 /// A camera that is aimed at the centre of the body or towards its limb. Each pair has the values of the first and the
 /// last picture.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Aimed {
     /// Angle between the optical axis and the centre, in angular radii of the body: 0 is the centre, 1 the limb.

@@ -25,6 +25,7 @@ use steps::AttitudeSteps;
 
 /// The rotation of the vehicle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Attitude {
     /// A sounding rocket: spin-up under thrust, yo-yo, then drift under rate control.

@@ -11,6 +11,7 @@ use crate::pose::{Look, Pose};
 
 /// A camera whose angles change evenly from the first picture to the last one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Pointing {
     /// Angle between the optical axis and straight down, degrees, in the first and the last picture.
@@ -52,9 +53,11 @@ impl Pointing {
 
 /// A camera that looks at one body after the other.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Towards {
     /// `sun`, `moon`, `earth`; each gets an equal share of the time.
+    #[cfg_attr(feature = "schema", schemars(schema_with = "crate::foreign_schema::bodies"))]
     pub bodies: Vec<Kind>,
     /// Amplitude of the optical axis's motion around the body, degrees.
     pub wander_deg: f64,

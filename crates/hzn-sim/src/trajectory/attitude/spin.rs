@@ -13,6 +13,7 @@ use crate::trajectory::rocket::Ascent;
 
 /// A spinning rocket and its rate control.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Spin {
     /// Spin about the long axis after burn-out, turns per second.
@@ -21,6 +22,7 @@ pub struct Spin {
     pub spun_up_s: f64,
     /// Time at which the yo-yo is released, seconds. The spin is gone one second later, and rate control begins. `inf`:
     /// the spin goes on.
+    #[cfg_attr(feature = "schema", schemars(extend("infinite" = true)))]
     pub yoyo_s: f64,
     /// Rate about the long axis at which a thruster fires, degrees per second.
     pub limit_deg_s: f64,

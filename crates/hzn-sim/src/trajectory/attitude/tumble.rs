@@ -8,6 +8,7 @@ use crate::counter::{Counter, Stream};
 
 /// A rigid body without torque.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Tumble {
     /// Rates about the vehicle's axes at time 0, degrees per second.
