@@ -36,7 +36,7 @@ pub(super) struct Args {
     /// Kind of lens [default: pinhole, up to a field of view of 90 degrees]
     #[arg(long, requires = "pictures")]
     lens: Option<Lens>,
-    /// The body in the pictures; the Moon as seen from an orbit or a flight around it
+    /// The body in the pictures; the Moon as seen from an orbit or a flight around it, the Sun as a disc in the sky
     #[arg(long, value_name = "NAME", default_value = "earth", value_parser = body_parser(), requires = "pictures")]
     body: start::Body,
     /// Altitude of all pictures above WGS-84, or above the mean radius of another body, kilometres, if no frames.csv
@@ -64,7 +64,7 @@ pub(super) struct Args {
 /// Returns whether a body has no air.
 fn has_no_air(body: start::Body) -> bool {
     match body {
-        start::Body::Earth => false,
+        start::Body::Earth | start::Body::Sun => false,
         start::Body::Moon => true,
         start::Body::Other(kind) => kind.planet().is_some_and(|planet| planet.scale_height_km == 0.0),
     }
@@ -304,6 +304,9 @@ fn known(args: &Args, source: &mut dyn Source) -> Result<CameraFacts, Stop> {
     source.notes().iter().for_each(tell::warning);
     if let Some(km) = args.altitude.filter(|km| !(*km > 0.0 && km.is_finite())) {
         return Err(usage(format!("--altitude {km}: must be above 0 km")));
+    }
+    if args.body == start::Body::Sun && args.altitude.is_some() {
+        return Err(usage("--altitude: the disc of the Sun has one size from everywhere near the Earth; leave it out"));
     }
     Ok(CameraFacts {
         fov_deg: args.fov,

@@ -2,7 +2,7 @@
 
 use image::GrayImage;
 
-use crate::common::{NO_TONE, Place, SENSOR, angle_deg, axes, limb};
+use crate::common::{NO_TONE, Place, SENSOR, angle_deg, axes, cell, limb};
 
 /// Returns a file as numpy.save writes it: temperatures from -40 to 20 degrees.
 fn npy(picture: &GrayImage) -> Vec<u8> {
@@ -49,4 +49,40 @@ fn arrays_have_the_answer_of_the_picture() {
     let ran = place.run(&["run", "arrays", "-s", "in/sensor.toml"]).expect(3);
     assert_eq!(ran.out.lines().count(), 4);
     ran.says("c.npy: the data end before the picture is complete");
+}
+
+/// Who has pictures of the Sun needs no altitude, and can write the place of its centre into their headers.
+#[test]
+fn pictures_of_the_sun() {
+    let place = Place::new();
+    std::fs::create_dir(place.path("sun")).unwrap();
+    let (radius_px, centres) = (80.0, [[170.0, 100.0], [171.25, 100.5], [172.5, 101.0]]);
+    for (i, [cx, cy]) in centres.iter().enumerate() {
+        let picture = GrayImage::from_fn(320, 240, |x, y| {
+            let d = (f64::from(x) - cx).hypot(f64::from(y) - cy);
+            // The limb of the Sun is darker than its centre.
+            let darkening = 0.4 + 0.6 * (1.0 - (d / radius_px).powi(2)).max(0.0).sqrt();
+            image::Luma([(5.0 + 230.0 * darkening * (radius_px - d + 0.5).clamp(0.0, 1.0)) as u8])
+        });
+        place.write(&format!("sun/{i}.fits"), &fits(&picture));
+    }
+    // The radius of 0.2666 degrees is 80 px.
+    let focal_px = radius_px / 0.2666f64.to_radians().tan();
+    let fov = (2.0 * (160.0 / focal_px).atan()).to_degrees().to_string();
+    let init = ["init", "sun", "--body", "sun", "--fov", &fov, "-o", "sun/sensor.toml"];
+    let ran = place.run(&init).expect(0);
+    assert!(!ran.err.contains("altitude"), "{}", ran.err);
+    place.run(&[&init[..], &["--altitude", "400", "--force"]].concat()).expect(2).says("leave it out");
+    place.run(&["run", "sun", "-o", "sun.csv"]).expect(0);
+    let [fx, ..] = ["fx_px = "].map(|key| {
+        let text = place.read("sun/sensor.toml");
+        text.split_once(key).unwrap().1.lines().next().unwrap().parse::<f64>().unwrap()
+    });
+    for (row, [cx, cy]) in place.rows("sun.csv").iter().zip(centres) {
+        assert_eq!(cell(row, "status"), "ok", "{row:?}");
+        let [x, y, z] = ["axis_x", "axis_y", "axis_z"].map(|name| cell(row, name).parse::<f64>().unwrap());
+        // The equations of reference/files.md. The lowest row of the file is number 1.
+        let crpix = [159.5 + 1.0 + fx * x / z, 240.0 - (119.5 + fx * y / z)];
+        assert!((crpix[0] - (cx + 1.0)).abs() < 0.05 && (crpix[1] - (240.0 - cy)).abs() < 0.05, "{crpix:?}");
+    }
 }

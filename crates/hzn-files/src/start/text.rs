@@ -210,6 +210,10 @@ fn write_body(body: Body, altitude_km: Option<f64>) -> String {
         ),
         // `kind = "moon"` is the disc in the sky of the Earth.
         Body::Moon => format!(
+        Body::Sun => {
+            return "\n[body]\nkind = \"sun\"                   # its disc has a known size: no altitude is needed\n"
+                .to_owned();
+        }
             "\n[body]\nkind = \"sphere\"                # the Moon, from near it\nradius_km = {MOON_RADIUS_KM}\n\
              # There is no air: the limb is as high as its hills, and overexposure does not raise it.\n{}",
             airless_limb(MOON_RADIUS_KM)
