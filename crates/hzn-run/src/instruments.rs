@@ -10,6 +10,10 @@ use hzn_mcap::{InstrumentMessage, Measured, read_instruments};
 use crate::disk::{self, Checked};
 use crate::error::{Error, unusable};
 use crate::source;
+use crate::source::measured::{self, Fix, Sample};
+
+/// Longest time between a rate and the acceleration in its row, seconds. Cameras have 200 of them a second.
+const MAX_APART_S: f64 = 0.02;
 
 /// An instrument in a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -120,6 +124,50 @@ pub fn write_table(
     }
     out.flush().map_err(cannot_write)?;
     Ok(exported)
+}
+
+/// Writes what an action camera measured as a table that `hzn fuse` reads. The rows have the times of the video, and
+/// the axes of the camera. Returns the number of rows.
+///
+/// # Errors
+/// The table cannot be written.
+pub fn write_measured(measured: &measured::Measured, instrument: Instrument, table: &Path) -> Result<u64, Error> {
+    let rows: Vec<String> = match instrument {
+        Instrument::Imu => measured.rates.iter().map(|rate| imu_row(measured, rate)).collect(),
+        Instrument::Gnss => measured.fixes.iter().map(gnss_row).collect(),
+    };
+    let cannot_write = |e: std::io::Error| disk::cannot_write(table, &e);
+    let mut out = BufWriter::new(Checked::create(table).map_err(cannot_write)?);
+    writeln!(out, "{}", instrument.header()).map_err(cannot_write)?;
+    for row in &rows {
+        writeln!(out, "{row}").map_err(cannot_write)?;
+    }
+    out.flush().map_err(cannot_write)?;
+    Ok(rows.len() as u64)
+}
+
+/// Returns the row of a rate, with the acceleration that is nearest in time.
+fn imu_row(measured: &measured::Measured, rate: &Sample) -> String {
+    let all = &measured.accelerations;
+    let next = all.partition_point(|sample| sample.time_s < rate.time_s);
+    let around = [next.checked_sub(1), Some(next)].into_iter().flatten().filter_map(|i| all.get(i));
+    let apart = |sample: &&Sample| (sample.time_s - rate.time_s).abs();
+    let nearest = around.min_by(|a, b| apart(a).total_cmp(&apart(b))).filter(|s| apart(s) < MAX_APART_S);
+    let [x, y, z] = rate.xyz;
+    let mut row = format!("{:.6},{x},{y},{z}", rate.time_s);
+    match nearest {
+        Some(Sample { xyz: [x, y, z], .. }) => {
+            let _ = write!(row, ",{x},{y},{z}");
+        }
+        None => row.push_str(",,,"),
+    }
+    row
+}
+
+/// Returns the row of a fix, whose sigmas the camera does not tell.
+fn gnss_row(fix: &Fix) -> String {
+    let Fix { time_s, lat_lon_deg: [lat, lon], height_m, .. } = fix;
+    format!("{time_s:.6},{lat},{lon},{height_m},,")
 }
 
 /// Returns the row of a message; `None` if it has no measurement.

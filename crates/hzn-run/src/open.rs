@@ -15,6 +15,7 @@ use toml_edit::DocumentMut;
 
 use crate::engine::{self, AnySensor};
 use crate::error::{Error, Remedy, unusable};
+use crate::source::measured::Measured;
 use crate::source::{self, FoundTone, Raw, Source};
 
 /// The files to open, and the values that replace those of the files.
@@ -106,7 +107,7 @@ pub fn open(request: &Request) -> Result<Opened, Error> {
         warnings.extend(frames.warnings.iter().map(Problem::to_string));
         warnings.extend(frames.check_sensor(&sensor.config).iter().map(Problem::to_string));
     }
-    notes.extend(explain_shutter(&sensor, frames.as_ref()));
+    notes.extend(explain_shutter(&sensor, frames.as_ref(), source.measured()));
     engine::check_frames(&sensor.config, request.flight, frames.as_ref())?;
     Ok(Opened { source, sensor, frames, warnings, notes })
 }
@@ -136,8 +137,16 @@ const WORTH_A_NOTE_RAD: f64 = 0.1 * core::f64::consts::PI / 180.0;
 
 /// Returns a note if only one of the two values that correct a rolling shutter is known: the readout time of the sensor
 /// without rates, or rates without a word about the readout time.
-fn explain_shutter(sensor: &Sensor, frames: Option<&Frames>) -> Option<String> {
+fn explain_shutter(sensor: &Sensor, frames: Option<&Frames>, measured: Option<&Measured>) -> Option<String> {
     let readout_s = sensor.config.camera.readout_s;
+    if let Some(measured) = measured.filter(|measured| frames.is_none() && !measured.rates.is_empty()) {
+        return measured.readout_s.filter(|_| readout_s == 0.0).map(|told_s| {
+            format!(
+                "the video says that a picture is read out in {told_s:.4} s: set camera.readout_s = {told_s:.4}, so \
+                 that its rows are corrected by the rates in the video"
+            )
+        });
+    }
     let Some(frames) = frames else {
         return (readout_s != 0.0).then(|| {
             format!(
@@ -374,7 +383,8 @@ pub fn check_size(source: &dyn Source, config: &Config) -> Result<(), Error> {
 pub fn check_altitude(source: &dyn Source, config: &Config, frames: Option<&Frames>) -> Result<(), Error> {
     // A position can come from the limb alone.
     let known = |b: &body::Config| b.half_angle_is_free() || b.altitude_km.is_some() || config.fits_position(b);
-    if frames.map_or(source.sensor_toml().is_some(), Frames::has_distances) {
+    let in_source = || source.sensor_toml().is_some() || source.measured().is_some_and(|m| !m.fixes.is_empty());
+    if frames.map_or_else(in_source, Frames::has_distances) {
         return Ok(());
     }
     if config.each_body().iter().any(known) || config.gates.altitude_limits_km.is_some() {

@@ -41,6 +41,7 @@ pub fn read_camera_facts(source: &mut dyn Source) -> Result<CameraFacts, Error> 
     let size_px = one_size(source)?;
     let tone = source::find_tone(source).map(|found| found.tone);
     let pixel_aspect = source.pixel_aspect();
+    let readout_s = source.measured().and_then(|measured| measured.readout_s);
     let step = source.total().map_or(1, |total| (total / PICTURES).max(1));
     let mut exif = None;
     let mut pictures: Vec<Picture> = Vec::new();
@@ -62,6 +63,7 @@ pub fn read_camera_facts(source: &mut dyn Source) -> Result<CameraFacts, Error> 
         image_circle_px: find_image_circle(&pictures),
         bars: find_bars(&pictures),
         pixel_aspect,
+        readout_s,
         ..CameraFacts::of_size(size_px)
     })
 }

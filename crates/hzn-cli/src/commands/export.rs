@@ -19,10 +19,12 @@ use crate::tell;
 
 /// Turn a recording into a table, pictures, or pictures with overlay
 ///
-/// From a recording of ROS 2, --imu and --gnss write the tables of inertial unit and receiver that `hzn fuse` reads.
+/// From a recording of ROS 2, or from a video of a GoPro, --imu and --gnss write the tables of inertial unit and
+/// receiver that `hzn fuse` reads.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// An MCAP of hzn; for tables also a .csv or .jsonl; for --imu and --gnss a recording or bag folder of ROS 2
+    /// An MCAP of hzn; for tables also a .csv or .jsonl; for --imu and --gnss a recording or bag folder of
+    /// ROS 2, or a video of a GoPro
     file: PathBuf,
     /// A table: .csv, .jsonl, or - for stdout
     #[arg(short, long, value_name = "FILE")]
@@ -36,7 +38,7 @@ pub(super) struct Args {
     /// The folder for the recorded pictures with everything drawn over them, as PNG
     #[arg(long, value_name = "DIR")]
     overlay: Option<PathBuf>,
-    /// A table of the inertial unit for `hzn fuse --imu`, from the messages sensor_msgs/Imu of ROS 2
+    /// A table of the inertial unit for `hzn fuse --imu`, from the messages sensor_msgs/Imu of ROS 2, or from a video
     #[arg(long, value_name = "CSV")]
     imu: Option<PathBuf>,
     /// A table of the receiver for `hzn fuse --gnss`, from the messages sensor_msgs/NavSatFix of ROS 2
@@ -59,7 +61,9 @@ pub(super) fn run(args: &Args) -> Outcome {
         return export_rows(args);
     }
     if args.output.is_some() || args.images.is_some() || args.overlay.is_some() {
-        return Err(usage("--imu and --gnss are for recordings of ROS 2, the other outputs for those of hzn"));
+        return Err(usage(
+            "--imu and --gnss are for recordings of ROS 2 and videos, the other outputs for recordings of hzn",
+        ));
     }
     export_instruments::run(&args.file, &tables, &args.topic, args.force)
 }
@@ -73,7 +77,7 @@ fn export_rows(args: &Args) -> Outcome {
     if args.output.is_none() && !pictures {
         return Err(usage(
             "nothing to export: give -o out.csv, -o out.jsonl, --images DIR or --overlay DIR; or --imu imu.csv, --gnss \
-             gnss.csv for a recording of ROS 2",
+             gnss.csv for a recording of ROS 2 or a video",
         ));
     }
     let to_file = args.output.as_ref().filter(|path| !source::is_stdin(path));

@@ -1,10 +1,11 @@
-//! `hzn export --imu --gnss`: the tables of `hzn fuse` from a recording of ROS 2.
+//! `hzn export --imu --gnss`: the tables of `hzn fuse` from a recording of ROS 2, or from a video of an action camera.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use hzn_run::explain::counted;
 use hzn_run::instruments::{self, Exported, Instrument};
+use hzn_run::source;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::files;
@@ -12,6 +13,9 @@ use crate::tell::{self, one_line};
 
 /// Writes the tables.
 pub(super) fn run(input: &Path, tables: &[(Instrument, &Path)], wanted: &[String], force: bool) -> Outcome {
+    if source::is_video(input) {
+        return of_video(input, tables, wanted, force);
+    }
     let recordings = instruments::recordings(input)?;
     let written: Vec<PathBuf> = tables.iter().map(|(_, path)| path.to_path_buf()).collect();
     files::check_outputs(&recordings, &written, force)?;
@@ -30,6 +34,38 @@ pub(super) fn run(input: &Path, tables: &[(Instrument, &Path)], wanted: &[String
         report(*which, table, &exported)?;
     }
     Ok(if is_cut { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+/// Writes the tables of a video of an action camera.
+fn of_video(input: &Path, tables: &[(Instrument, &Path)], wanted: &[String], force: bool) -> Outcome {
+    let name = input.display();
+    if let Some(topic) = wanted.first() {
+        return Err(usage(format!("--topic {topic}: a video has no topics")));
+    }
+    let written: Vec<PathBuf> = tables.iter().map(|(_, path)| path.to_path_buf()).collect();
+    files::check_outputs(&[input.to_owned()], &written, force)?;
+    let measured = source::measured::read(input).map_err(|e| failed(format!("{name}: cannot be read: {e}")))?;
+    let what = "the video has no measurements of its camera in GPMF, the format of GoPro; those of other cameras are \
+                not read";
+    let measured = measured.ok_or_else(|| failed(format!("{name}: {what}")))?;
+    let is_missing = |(which, _): &(Instrument, &Path)| match which {
+        Instrument::Imu => measured.rates.is_empty(),
+        Instrument::Gnss => measured.fixes.is_empty(),
+    };
+    if tables.iter().any(is_missing) {
+        return Err(failed(format!("{name}: {}", measured.describe())));
+    }
+    for (which, table) in tables {
+        let rows = instruments::write_measured(&measured, *which, table)?;
+        tell::line(one_line(format!("{}: {} of {}", table.display(), counted(rows, "row"), measured.camera)));
+    }
+    if tables.iter().any(|(which, _)| *which == Instrument::Imu) {
+        tell::line("note: the axes are those of the camera: x to the right, y down, z along the line of sight");
+    }
+    if measured.without_fix > 0 {
+        tell::warning(format_args!("{} without a fix were left out", counted(measured.without_fix, "position")));
+    }
+    Ok(Exit::Done)
 }
 
 /// Chooses the topic of an instrument: the one that was asked for, or the only one.

@@ -28,6 +28,7 @@ mod fuse;
 mod fuse_points;
 mod fuse_tables;
 mod gates;
+mod gopro;
 mod hostile;
 mod kept_inputs;
 mod mask;

@@ -35,6 +35,8 @@ pub struct CameraFacts {
     pub bars: Option<Bars>,
     /// Width of a pixel over its height; 1 for nearly all cameras, but not for every video.
     pub pixel_aspect: f64,
+    /// Time from the first to the last row of a picture in seconds, if the video says it.
+    pub readout_s: Option<f64>,
 }
 
 impl CameraFacts {
@@ -52,6 +54,7 @@ impl CameraFacts {
             image_circle_px: None,
             bars: None,
             pixel_aspect: 1.0,
+            readout_s: None,
         }
     }
     /// Returns whether a stated field of view or EXIF gives the focal length.

@@ -99,6 +99,12 @@ fn write_camera(facts: &CameraFacts, camera: &Config, focal: &Focal, fov_deg: f6
         "fx_px = {:.1}\nfy_px = {:.1}\ncx_px = {:.1}                 # the picture's centre\ncy_px = {:.1}\n",
         camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px
     );
+    if let Some(readout_s) = facts.readout_s {
+        let _ = writeln!(
+            t,
+            "readout_s = {readout_s:.5}           # time from the first row to the last, as the video says"
+        );
+    }
     t
 }
 
@@ -204,16 +210,16 @@ fn write_body(body: Body, altitude_km: Option<f64>) -> String {
             "\n[body]\nkind = \"earth\"                 # earth (WGS-84) | earth-sphere | sun | moon | sphere\n"
                 .to_owned()
         }
+        Body::Sun => {
+            return "\n[body]\nkind = \"sun\"                   # its disc has a known size: no altitude is needed\n"
+                .to_owned();
+        }
         Body::Other(kind) => format!(
             "\n[body]\nkind = \"{}\"                  # with its radii, and a limb height that fits it\n",
             kind.name()
         ),
         // `kind = "moon"` is the disc in the sky of the Earth.
         Body::Moon => format!(
-        Body::Sun => {
-            return "\n[body]\nkind = \"sun\"                   # its disc has a known size: no altitude is needed\n"
-                .to_owned();
-        }
             "\n[body]\nkind = \"sphere\"                # the Moon, from near it\nradius_km = {MOON_RADIUS_KM}\n\
              # There is no air: the limb is as high as its hills, and overexposure does not raise it.\n{}",
             airless_limb(MOON_RADIUS_KM)

@@ -62,6 +62,7 @@ pub use raw::Raw;
 pub use rerun::{describe_loss as describe_recording_loss, describe_rest, describe_unread, recorded_prior};
 pub use sequence::Source;
 pub use tone::FoundTone;
+pub use video::measured;
 
 use crate::error::{Error, Remedy, unusable};
 

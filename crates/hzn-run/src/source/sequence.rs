@@ -7,6 +7,7 @@ use hzn_core::image::Channel;
 use super::item::Item;
 use super::payload::Payload;
 use super::tone::FoundTone;
+use super::video::measured::Measured;
 use crate::error::Error;
 
 /// Largest number of pictures whose headers [`Source::sizes`] reads.
@@ -63,6 +64,10 @@ pub trait Source: Send {
     /// Returns the width of a pixel over its height, as the container says it. A lens with fx = fy needs 1.
     fn pixel_aspect(&self) -> f64 {
         1.0
+    }
+    /// Returns what the camera measured while it filmed, which gives the pictures their prior ([`Item::data`]).
+    fn measured(&self) -> Option<&Measured> {
+        None
     }
     /// Announces that a colour channel is wanted. Some sources must know this before they read.
     ///

@@ -8,6 +8,9 @@
 //! A missing end is detected by the messages of ffmpeg and by the sizes in an AVI. It is not detected for a y4m, or for
 //! a stream such as MPEG-TS that was cut between two frames.
 
+mod gpmf;
+pub mod measured;
+mod mp4;
 mod riff;
 mod times;
 mod tool;
@@ -19,15 +22,17 @@ use std::thread::JoinHandle;
 
 use hzn_core::image::{Channel, Layout};
 use hzn_core::tone::Tone;
+use hzn_files::FrameData;
 
 use super::decode::check_size;
-use super::item::Item;
+use super::item::{Item, TimeSource};
 use super::payload::Payload;
 use super::picture::{Picture, Samples};
 use super::sequence::Source;
 use super::tone::FoundTone;
 use crate::error::{Error, failed, unusable};
 use crate::explain;
+use measured::Measured;
 use times::Times;
 use tool::{Running, ToolErrors, add_input, cannot_start, tool};
 
@@ -57,6 +62,8 @@ pub(super) struct Video {
     /// The thread that reads the messages of ffmpeg while it runs.
     errors: Option<JoinHandle<ToolErrors>>,
     times: Times,
+    /// What an action camera measured while it filmed.
+    measured: Option<Measured>,
     index: u64,
     count: Option<u64>,
     ended: bool,
@@ -107,6 +114,7 @@ impl Video {
             pixels,
             errors: Some(errors),
             times: Times::start(path)?,
+            measured: measured::read(path).map_err(|e| failed(format!("{name}: cannot be read: {e}")))?,
             index: 0,
             count: entry("nb_frames").and_then(|n| n.trim().parse().ok()),
             ended: false,
@@ -204,6 +212,12 @@ impl Source for Video {
     fn pixel_aspect(&self) -> f64 {
         self.pixel_aspect
     }
+    fn measured(&self) -> Option<&Measured> {
+        self.measured.as_ref()
+    }
+    fn notes(&self) -> Vec<String> {
+        self.measured.iter().map(|measured| format!("{}: {}", self.stem, measured.describe())).collect()
+    }
     fn display_turn(&self) -> Option<(String, &'static str)> {
         self.rotation.map(|how| (self.stem.clone(), how))
     }
@@ -252,7 +266,13 @@ impl Source for Video {
         let name = format!("{}#{:06}", self.stem, self.index);
         let time = self.times.next();
         self.index += 1;
-        Some(Ok(Item { name, time, stamp: None, data: None, payload: Payload::Decoded(picture) }))
+        let data = match (&self.measured, time) {
+            (Some(measured), TimeSource::Container(Some(time_s))) => {
+                Some(FrameData { file: name.clone(), ..measured.at(time_s) })
+            }
+            _ => None,
+        };
+        Some(Ok(Item { name, time, stamp: None, data, payload: Payload::Decoded(picture) }))
     }
     fn total(&self) -> Option<u64> {
         self.count
