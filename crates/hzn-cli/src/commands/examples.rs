@@ -34,6 +34,7 @@ hzn info sensor.toml --json    the same facts for a program, as one JSON object"
         "hzn export flight.mcap -o flight.csv            the rows of a recording, as a table
 hzn export flight.mcap -o - --format jsonl      the same on standard output
 hzn export flight.mcap --overlay drawn/         the pictures with edges, points and limb
+hzn export bag/ --images pictures/              the pictures of a bag, or of a video
 hzn export bag/ --imu imu.csv --gnss gnss.csv   from ROS 2, the tables of `hzn fuse`",
     ),
     ("recover", "hzn recover flight.mcap.part        keeps what is complete, in flight.mcap"),
@@ -141,11 +142,11 @@ hzn telemetry udp:0.0.0.0:5006,10.0.0.1:5005 --screen   a line, on the whole ter
         "hzn view flight/          the pictures of a folder, with their edges and points
 hzn view flight.mcap      a recording",
     ),
-    ),
     (
         "schema",
         "hzn schema sensor.toml > sensor.schema.json   for an editor of sensor.toml
 hzn schema scene.toml > scene.schema.json     for one of scene.toml",
+    ),
     (
         "completions",
         "source <(hzn completions bash)            in ~/.bashrc

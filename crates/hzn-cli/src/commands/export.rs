@@ -6,10 +6,11 @@ use hzn_mcap::{Contents, FrameRecord, ImageFormat, Reader};
 use hzn_run::instruments::Instrument;
 use hzn_run::overlay::caption::Caption;
 use hzn_run::sink::{self, Existing, RowFile};
-use hzn_run::source::{self, ending};
+use hzn_run::source::{self, Source};
 use hzn_run::{disk, explain, overlay, results};
 
-use super::export_instruments;
+use super::export_pictures::picture_name;
+use super::{export_instruments, export_pictures};
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
 use crate::files;
 use crate::kind_of_file;
@@ -32,7 +33,7 @@ pub(super) struct Args {
     /// Format of the table on stdout; without it, csv
     #[arg(long, value_name = "FORMAT")]
     format: Option<TableFormat>,
-    /// The folder for the recorded pictures
+    /// The folder for the recorded pictures, also those of a bag, of another program, or of a video
     #[arg(long, value_name = "DIR")]
     images: Option<PathBuf>,
     /// The folder for the recorded pictures with everything drawn over them, as PNG
@@ -41,10 +42,11 @@ pub(super) struct Args {
     /// A table of the inertial unit for `hzn fuse --imu`, from the messages sensor_msgs/Imu of ROS 2, or from a video
     #[arg(long, value_name = "CSV")]
     imu: Option<PathBuf>,
-    /// A table of the receiver for `hzn fuse --gnss`, from the messages sensor_msgs/NavSatFix of ROS 2
+    /// A table of the receiver for `hzn fuse --gnss`, from the messages sensor_msgs/NavSatFix of ROS 2, or from a
+    /// video
     #[arg(long, value_name = "CSV")]
     gnss: Option<PathBuf>,
-    /// The topic for --imu or --gnss, if there are several; may be given twice
+    /// The topic for --imu, --gnss or --images, if there are several; may be given twice
     #[arg(long, value_name = "TOPIC")]
     topic: Vec<String>,
     /// Replace files that exist
@@ -58,7 +60,10 @@ pub(super) fn run(args: &Args) -> Outcome {
         tables.into_iter().filter_map(|(which, path)| Some((which, path.as_deref()?))).collect();
     if tables.is_empty() {
         TableFormat::tell_unused(args.format, args.output.iter());
-        return export_rows(args);
+        return match export_pictures::open(&args.file, &args.topic)? {
+            Some(source) => export_pictures_of_others(args, source),
+            None => export_rows(args),
+        };
     }
     if args.output.is_some() || args.images.is_some() || args.overlay.is_some() {
         return Err(usage(
@@ -66,6 +71,20 @@ pub(super) fn run(args: &Args) -> Outcome {
         ));
     }
     export_instruments::run(&args.file, &tables, &args.topic, args.force)
+}
+
+/// Writes the pictures of an input that has no rows.
+fn export_pictures_of_others(args: &Args, mut source: Box<dyn Source>) -> Outcome {
+    let name = args.file.display();
+    match &args.images {
+        Some(folder) if args.output.is_none() && args.overlay.is_none() => {
+            export_pictures::run(source.as_mut(), folder, args.force)
+        }
+        _ => Err(usage(format!(
+            "{name}: has pictures and no rows of hzn: --images DIR writes the pictures, and \
+             `hzn run {name} -o out.csv` makes rows"
+        ))),
+    }
 }
 
 /// Writes the rows and the pictures of a recording of hzn.
@@ -179,11 +198,4 @@ fn write_pictures(args: &Args, frame: FrameRecord, provenance: &str) -> Result<b
 fn decode(image: &hzn_mcap::EncodedImage, name: &str) -> Result<hzn_run::source::Picture, Stop> {
     let decoded = hzn_run::source::Payload::from_recorded(image.clone()).decode(None);
     decoded.map(|(picture, _)| picture).map_err(|why| failed(format!("{name}: {why}")))
-}
-
-/// Returns the file name for a picture: its own name, with an ending that fits its bytes.
-fn picture_name(name: &str, ending: &str) -> String {
-    let flat = overlay::flat_name(name);
-    let same = |e: &str| e == ending || (ending == "jpg" && matches!(e, "jpeg" | "jpe"));
-    if same(&self::ending(Path::new(&flat))) { flat } else { format!("{flat}.{ending}") }
 }

@@ -10,6 +10,7 @@ mod examples;
 mod explain;
 mod export;
 mod export_instruments;
+mod export_pictures;
 #[cfg(target_os = "linux")]
 mod fly;
 mod fuse;
@@ -25,8 +26,8 @@ mod prepare;
 mod recover;
 mod resume;
 mod run;
-#[cfg(feature = "simulator")]
 mod schema;
+#[cfg(feature = "simulator")]
 mod sensitivity;
 #[cfg(feature = "simulator")]
 mod simulate;
@@ -94,8 +95,8 @@ enum Command {
     Telemetry(telemetry::Args),
     Telecommand(telecommand::Args),
     View(view::Args),
-    Completions(completions::Args),
     Schema(schema::Args),
+    Completions(completions::Args),
     Man(man::Args),
 }
 
@@ -143,8 +144,8 @@ pub fn run(cli: Cli) -> Outcome {
         Command::Telemetry(args) => telemetry::run(&args),
         Command::Telecommand(args) => telecommand::run(&args),
         Command::View(args) => view::run(&args),
-        Command::Completions(args) => completions::run(&args, command()),
         Command::Schema(args) => schema::run(&args),
+        Command::Completions(args) => completions::run(&args, command()),
         Command::Man(args) => man::run(&args, command()),
     }
 }

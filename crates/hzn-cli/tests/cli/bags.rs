@@ -325,3 +325,21 @@ fn instruments_of_a_bag_become_tables_for_fuse() {
     assert!(cut.code != 0, "{}", cut.err);
     place.run(&["export", "none.db3", "--imu", "cut.csv", "--force"]).expect(2).says("no such file");
 }
+
+#[test]
+fn the_pictures_of_a_bag_become_files() {
+    let place = place(FRAME);
+    for input in ["bag", "bag/bag_0.mcap"] {
+        let out = format!("out-{}", input.len());
+        let ran = place.run(&["export", input, "--images", &out]).expect(0);
+        assert!(format!("{}{}", ran.out, ran.err).contains("3 pictures"), "{}", ran.err);
+        let mut files: Vec<_> = fs::read_dir(place.path(&out)).unwrap().map(|entry| entry.unwrap().path()).collect();
+        files.sort();
+        assert_eq!(files.len(), 3);
+        for (i, file) in files.iter().enumerate() {
+            assert_eq!(image::open(file).unwrap().to_luma8(), limb(320, 240, i as f64), "{}", file.display());
+        }
+        place.run(&["export", input, "--images", &out]).expect(2).says("exists already");
+    }
+    place.run(&["export", "bag", "-o", "rows.csv"]).expect(2).says("`hzn run bag -o out.csv` makes rows");
+}
