@@ -79,6 +79,9 @@ fn complete(said: &Said<'_>) -> PyResult<CameraFacts> {
     if let Some(km) = said.altitude_km.filter(|km| !(*km > 0.0 && km.is_finite())) {
         return Err(errors::config(format!("altitude_km: {km} is refused: must be above 0")));
     }
+    if body == Body::Sun && said.altitude_km.is_some() {
+        return Err(errors::config("altitude_km: the Sun has one size from everywhere near the Earth; leave it out"));
+    }
     let read = match (said.pictures.as_slice(), said.size) {
         ([], Some((width, height))) => CameraFacts::of_size([width, height]),
         (paths @ [_, ..], None) => {

@@ -57,6 +57,7 @@ def quaternion(rotation):
         (["--lens", "fisheye", "--altitude", "418"], dict(lens="fisheye", altitude_km=418.0)),
         (["--fov", "120", "--lens", "fisheye"], dict(fov_deg=120.0, lens="fisheye")),
         (["--fov", "40", "--body", "moon", "--altitude", "100"], dict(fov_deg=40.0, body="moon", altitude_km=100.0)),
+        (["--fov", "2", "--body", "sun"], dict(fov_deg=2.0, body="sun")),
     ],
 )
 def test_the_start_is_that_of_hzn_init(options, arguments, tmp_path, hzn_program):
@@ -80,6 +81,7 @@ def test_a_start_by_the_size_alone(tmp_path, hzn_program):
     ("arguments", "message"),
     [
         (dict(fov_deg=60), "give either pictures or size"),
+        (dict(size=(320, 240), fov_deg=2, body="sun", altitude_km=400), "altitude_km: the Sun has one size"),
         (dict(size=(320, 240)), "fov_deg=60, and lens=\"fisheye\" or lens=\"pinhole\""),
         (dict(size=(320, 240), fov_deg=120), "fov_deg=120: a lens of this width may be .* lens=\"fisheye\""),
         (dict(size=(320, 240), fov_deg=60, lens="fish"), "lens: \"fish\" is refused"),

@@ -69,7 +69,8 @@ fn planets_and_moons_have_their_radii_and_limbs() {
             assert_eq!((written.kind, written.limb_height_km), (kind, own.limb_height_km));
             assert_eq!(written.mean_radius_km(), own.mean_radius_km());
         }
-        assert_eq!(written.altitude_km, altitude_km, "{body:?}");
+        // The Sun is equally large from everywhere near the Earth.
+        assert_eq!(written.altitude_km, altitude_km.filter(|_| body != Body::Sun), "{body:?}");
         assert!(sensor.warnings.is_empty(), "{body:?}: {:?}", sensor.warnings);
     }
 }

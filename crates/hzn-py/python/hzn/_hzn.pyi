@@ -392,7 +392,7 @@ class Sensor:
         lens: Literal["pinhole", "fisheye"] | None = None,
         altitude_km: float | None = None,
         body: Literal[
-            "earth", "moon", "mercury", "venus", "mars", "jupiter", "saturn", "uranus",
+            "earth", "moon", "sun", "mercury", "venus", "mars", "jupiter", "saturn", "uranus",
             "neptune", "pluto", "ceres", "vesta", "phobos", "deimos", "io", "europa",
             "ganymede", "callisto", "mimas", "enceladus", "tethys", "dione", "rhea", "titan",
             "iapetus", "miranda", "ariel", "umbriel", "titania", "oberon", "triton", "charon",
