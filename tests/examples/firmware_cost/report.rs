@@ -25,8 +25,8 @@ exception on top, so no picture can need more.
 The goals are for a Cortex-M7. For the sensor alone, they are 125 KiB (128000 bytes) of flash, 16 KiB (16384 bytes) of
 stack with the start-up, 96 KiB of RAM in addition to the picture, and these instructions: 0.60 million for a clean
 picture of 1920×1080, 0.43 million for one in a sequence, 2 million for a cloudy one, 20 million for the worst, with and
-without tracking. Flash, stack and the clean picture, alone (also with 200 points kept) and in a sequence, miss their
-goals; [speed.md](speed.md#missed-goals) says why, and [porting.md](../guide/porting.md) what fewer points cost.
+without tracking. Flash and the clean picture, alone (also with 200 points kept) and in a sequence, miss their goals;
+[speed.md](speed.md#missed-goals) says why, and [porting.md](../guide/porting.md) what fewer points cost.
 
 With tracking, 18 expensive pictures are counted: seeds 24 to 35, each after a clear limb and with the sensor of that
 flight, and seeds 52 to 57 with the sensor for the Moon, each after a picture of it. The most expensive picture of the

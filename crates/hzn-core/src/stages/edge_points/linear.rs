@@ -62,16 +62,14 @@ pub(super) fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     }
     let (half, fifth) = (4 * level / steep.max(1), 3 * level / (2 * steep.max(1)));
     let step = half.min(fifth.max(4)).clamp(1, WIDEST);
-    let [inside, here, outside] = near.across(lit);
-    // A step of one pixel leads to the neighbours, which are not read again.
-    let beside = (step == 1).then_some([inside, outside]);
+    let here = near.across(lit)[1];
     let reach = (MARGIN * step) as u16;
     *extra_cost += work::SLOW_POINT;
     let found = if is_line_clear(binary, p, (dx, dy), reach) || (FREE && is_clear(binary, p, reach)) {
-        locate_in_steps::<T, P, O, true>(binary, p, (dx, dy), step, here, beside)?
+        locate_in_steps::<T, P, O, true>(binary, p, (dx, dy), step, here)?
     } else {
         *extra_cost += binary.region.checks_cost(p.x, p.y, reach);
-        locate_in_steps::<T, P, O, false>(binary, p, (dx, dy), step, here, beside)?
+        locate_in_steps::<T, P, O, false>(binary, p, (dx, dy), step, here)?
     };
     let WideCrossing { off, fallback, clipped, .. } =
         if found.rising { recentre_profile(binary, p, (dx, dy), step, found, extra_cost) } else { found };
@@ -130,7 +128,7 @@ fn locate_from<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
 ) -> Option<WideCrossing<T>> {
     let around = Around::<T, P, O, FREE>::new(binary, p);
     let here = Line::new(&around, towards_dark, step).smoothed(0)?;
-    locate_in_steps::<T, P, O, FREE>(binary, p, towards_dark, step, here, None)
+    locate_in_steps::<T, P, O, FREE>(binary, p, towards_dark, step, here)
 }
 
 /// Returns whether the border of the region and all masks are more than `margin` pixels away.
@@ -168,7 +166,7 @@ struct WideCrossing<T> {
 }
 
 /// Locates the crossing like [`linear`], with steps of `step` pixels. `here` is the smoothed brightness of the border
-/// pixel. `beside` is that of one step to the lit side and one step to the dark side, if it was read before.
+/// pixel.
 #[inline(never)]
 fn locate_in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     binary: &BinaryPicture<'_, T, P, O>,
@@ -176,15 +174,11 @@ fn locate_in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     (dx, dy): (i32, i32),
     step: i32,
     here: i32,
-    beside: Option<[i32; 2]>,
 ) -> Option<WideCrossing<T>> {
     let around = Around::<T, P, O, FREE>::new(binary, p);
     let line = Line::new(&around, (dx, dy), step);
-    let [inside, outside] = match beside {
-        Some(read) => read,
-        None => [line.smoothed(-1)?, line.smoothed(1)?],
-    };
-    let Crossing { part, mid2, fallback, clipped, rising } = line.crossing([inside, here, outside])?;
+    let Crossing { part, mid2, fallback, clipped, rising } =
+        line.crossing([line.smoothed(-1)?, here, line.smoothed(1)?])?;
     let coarse = part * T::from_i32(step);
     // The profile is curved within a step. The crossing is therefore interpolated again over half a step around it.
     let half = step / 2;
