@@ -56,13 +56,32 @@ pub struct Epoch {
     pub cameras: Vec<CameraState>,
     /// Rate of the vehicle against the Earth, rad/s.
     pub rate_rad_s: Vector<Vehicle>,
-    /// Attitude of the strapdown solution from the start on without any aid.
-    pub unaided: Option<Rotation<Vehicle, Fixed>>,
+    /// The strapdown solution from the start on without any aid.
+    pub unaided: Option<Unaided>,
+}
+
+/// The attitude of the strapdown solution without any aid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unaided {
+    /// Attitude.
+    pub attitude: Rotation<Vehicle, Fixed>,
+    /// Covariance of the attitude: of a rotation vector, rad². It has the first attitude's, and what the errors and the
+    /// noise of the gyros add.
+    pub covariance_rad2: Covariance<Vehicle>,
+}
+
+impl Unaided {
+    /// Returns the attitude of a filter that takes no measurement.
+    pub(crate) fn of<const N: usize>(filter: &Filter<N>) -> Self {
+        let attitude = filter.nominal().attitude;
+        let covariance = filter.covariance().fixed_view::<3, 3>(Layout::ATTITUDE, Layout::ATTITUDE).into_owned();
+        Self { attitude, covariance_rad2: Covariance::<Fixed>::from(covariance).rotated(&attitude.inverse()) }
+    }
 }
 
 impl Epoch {
     /// Returns the solution of a filter.
-    pub(crate) fn of<const N: usize>(filter: &Filter<N>, unaided: Option<Rotation<Vehicle, Fixed>>) -> Self {
+    pub(crate) fn of<const N: usize>(filter: &Filter<N>, unaided: Option<Unaided>) -> Self {
         let layout = filter.layout();
         let sigmas = |place: Option<Place>| place.map_or_else(Vector3::zeros, |p| filter.sigmas(p.first));
         let one = |place: Option<Place>| place.map_or(0.0, |p| filter.sigmas(p.first).x);

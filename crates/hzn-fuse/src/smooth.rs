@@ -7,10 +7,9 @@
 //! C = P⁺ₖ Φᵀ (P⁻ₖ₊₁)⁻¹, xˢₖ = x⁺ₖ + C (xˢₖ₊₁ − x⁻ₖ₊₁), Pˢₖ = P⁺ₖ + C (Pˢₖ₊₁ − P⁻ₖ₊₁) Cᵀ.
 
 use hzn_nav::filter::Filter;
-use hzn_nav::frames::{Fixed, Rotation, Vehicle};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use crate::results::Epoch;
+use crate::results::{Epoch, Unaided};
 
 /// Most measurements that a smoother keeps; each takes 80 to 160 kB.
 pub const MAX_EPOCHS: usize = 40_000;
@@ -24,7 +23,7 @@ pub(crate) struct Recorded<const N: usize> {
     pub(crate) transition: SMatrix<f64, N, N>,
     /// Whether the filter began again here: nothing before is related.
     pub(crate) begins: bool,
-    pub(crate) unaided: Option<Rotation<Vehicle, Fixed>>,
+    pub(crate) unaided: Option<Unaided>,
 }
 
 /// Returns the smoothed solution, in the order of time.

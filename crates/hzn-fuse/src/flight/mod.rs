@@ -3,6 +3,7 @@
 mod first;
 mod lost;
 mod runner;
+mod unaided;
 
 use hzn_nav::frames::{Cam, Rotation, Vehicle};
 use hzn_nav::layout::MAX_CAMERAS;

@@ -4,18 +4,19 @@ use hzn_nav::filter::{DirectionMeasurement, Filter, Unusable};
 use hzn_nav::frames::{Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::gravity::gravity;
 use hzn_nav::options::{CameraOptions, StartSigmas};
-use hzn_nav::strapdown::{Imu, Nominal};
+use hzn_nav::strapdown::Imu;
 use hzn_nav::vectors::{Direction, triad};
 use nalgebra::SMatrix;
 
 use super::first::{first_attitude, sight_sigma};
 use super::lost::{Lost, refused_in_a_row};
+use super::unaided::{UNAIDED, unaided};
 use crate::data::Flight;
 use crate::error::Error;
 use crate::events::{Event, Source, mix};
 use crate::input::{Body, Recording, Sample, Seen};
 use crate::reference::limb_axis;
-use crate::results::{Begin, Epoch, Fused, Innovation, Kind, Triad};
+use crate::results::{Begin, Epoch, Fused, Innovation, Kind, Triad, Unaided};
 use crate::settings::{Limb, Settings};
 use crate::smooth::Recorded;
 use crate::start::{DeadReckoning, Sight, Sighted, attitude};
@@ -44,8 +45,8 @@ pub(super) struct Runner<'a, const N: usize> {
     filter: Filter<N>,
     begin: Begin,
     reckoning: DeadReckoning,
-    /// The strapdown solution without any aid.
-    unaided: Nominal,
+    /// The strapdown solution without any aid: a filter that takes no measurement.
+    unaided: Filter<UNAIDED>,
     last: Option<Imu>,
     /// The last sights, for a new start.
     sights: Vec<Sight>,
@@ -78,13 +79,15 @@ impl<'a, const N: usize> Runner<'a, N> {
         let mut filter =
             Filter::<N>::new(found.state, &flight.options(settings, sigmas), &cameras).map_err(Error::unusable)?;
         let least = Covariance::isotropic(sigmas.attitude_rad.powi(2));
-        filter.set_attitude(&found.state.attitude, &(found.covariance_rad2 + least));
+        let covariance_rad2 = found.covariance_rad2 + least;
+        filter.set_attitude(&found.state.attitude, &covariance_rad2);
+        let unaided = unaided(&found.state, &flight.options(settings, sigmas), &covariance_rad2)?;
         Ok(Self {
             flight: *flight,
             settings,
             cameras,
             bodies,
-            unaided: found.state,
+            unaided,
             filter,
             begin: found.begin,
             reckoning,
@@ -159,9 +162,7 @@ impl<'a, const N: usize> Runner<'a, N> {
             // How the vehicle has turned since these sights is not known.
             self.sights.clear();
         }
-        if let Some(last) = self.last {
-            self.unaided = self.unaided.step(&last, imu);
-        }
+        self.unaided.predict(imu, saturated);
         self.last = Some(*imu);
     }
 
@@ -206,7 +207,7 @@ impl<'a, const N: usize> Runner<'a, N> {
     }
 
     fn push_epoch(&mut self) {
-        self.out.epochs.push(Epoch::of(&self.filter, Some(self.unaided.attitude)));
+        self.out.epochs.push(Epoch::of(&self.filter, Some(Unaided::of(&self.unaided))));
     }
 
     /// Takes a measurement at the time of the filter.
@@ -230,7 +231,7 @@ impl<'a, const N: usize> Runner<'a, N> {
                 after: self.filter.clone(),
                 transition: self.transition,
                 begins: self.begins,
-                unaided: Some(self.unaided.attitude),
+                unaided: Some(Unaided::of(&self.unaided)),
             });
             self.transition = SMatrix::identity();
             self.begins = false;
@@ -285,7 +286,7 @@ impl<'a, const N: usize> Runner<'a, N> {
         let told = self.cameras.get(camera).map_or_else(Rotation::identity, |c| c.mount);
         let mount = self.filter.camera(camera).map_or(told, |c| c.mount);
         let angle = (self.filter.nominal().attitude * mount * seen.axis).angle_rad(&reference);
-        let unaided = (self.unaided.attitude * told * seen.axis).angle_rad(&reference);
+        let unaided = (self.unaided.nominal().attitude * told * seen.axis).angle_rad(&reference);
         let sigma_rad = sight_sigma(&seen, self.cameras.get(camera));
         let sight = Sight { time_s, camera, body: seen.body, on_vehicle: mount * seen.axis, reference, sigma_rad };
         self.pair(&sight);
@@ -334,7 +335,7 @@ impl<'a, const N: usize> Runner<'a, N> {
         let [first, second] = both;
         if let Some(attitude) = triad(&first, &second) {
             let angle_rad = attitude.angle_to(&self.filter.nominal().attitude);
-            let unaided_rad = attitude.angle_to(&self.unaided.attitude);
+            let unaided_rad = attitude.angle_to(&self.unaided.nominal().attitude);
             self.out.triads.push(Triad { time_s: sight.time_s, attitude, angle_rad, unaided_rad });
         }
     }

@@ -75,6 +75,8 @@ fn header(fused: &Fused) -> Vec<String> {
         names.extend(["w", "x", "y", "z"].map(|part| format!("{name}_told_q_vehicle_from_camera_{part}")));
     }
     names.push("verdict".to_owned());
+    names.extend(["qw", "qx", "qy", "qz"].map(|part| format!("unaided_{part}")));
+    names.extend(["xx", "xy", "xz", "yy", "yz", "zz"].map(|axes| format!("unaided_cov_{axes}_deg2")));
     names
 }
 
@@ -93,5 +95,9 @@ fn cells(s: &StateRecord) -> Vec<String> {
         numbers.extend(camera.told_q_vehicle_from_camera_wxyz);
     }
     let numbers = numbers.iter().map(f64::to_string);
-    [s.time_s.to_string(), phase].into_iter().chain(numbers).chain([s.verdict.to_owned()]).collect()
+    let cell = |x: Option<f64>| x.map(|x| x.to_string()).unwrap_or_default();
+    let quaternion = (0..4).map(|i| cell(s.unaided_q_wxyz.and_then(|q| q.get(i).copied())));
+    let covariance = (0..6).map(|i| cell(s.unaided_cov_deg2.and_then(|c| c.get(i).copied())));
+    let unaided = quaternion.chain(covariance);
+    [s.time_s.to_string(), phase].into_iter().chain(numbers).chain([s.verdict.to_owned()]).chain(unaided).collect()
 }

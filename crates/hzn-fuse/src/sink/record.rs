@@ -89,6 +89,11 @@ pub struct StateRecord {
     /// The verdict over the flight: `consistent`, `doubtful` or `contradicts`. It is the same in every record, so that
     /// a program that takes the results sees it.
     pub verdict: &'static str,
+    /// Attitude of the strapdown solution from the start on without any aid, as a quaternion from the vehicle's axes to
+    /// ECEF, scalar first; only of the filter's solutions and the smoother's.
+    pub unaided_q_wxyz: Option<[f64; 4]>,
+    /// Its covariance, a rotation vector in the vehicle's axes: xx, xy, xz, yy, yz, zz, deg².
+    pub unaided_cov_deg2: Option<[f64; 6]>,
 }
 
 /// The estimated errors of a camera.
@@ -163,6 +168,11 @@ fn triangle<F>(covariance: &Covariance<F>) -> [f64; 6] {
     [p.m11, p.m12, p.m13, p.m22, p.m23, p.m33]
 }
 
+/// Returns the upper triangle of a covariance in deg².
+fn deg2(covariance_rad2: &Covariance<Vehicle>) -> [f64; 6] {
+    triangle(covariance_rad2).map(|v| v * 1f64.to_degrees().powi(2))
+}
+
 fn state(fused: &Fused, epoch: &Epoch, phase: Phase) -> StateRecord {
     let now = &epoch.state;
     let [[x_m, y_m, z_m], [vx_mps, vy_mps, vz_mps]] = [now.position_m, now.velocity_m_s].map(|v| v.xyz());
@@ -201,7 +211,7 @@ fn state(fused: &Fused, epoch: &Epoch, phase: Phase) -> StateRecord {
         vz_mps,
         position_sigma_m: largest(&epoch.position_covariance_m2),
         velocity_sigma_mps: largest(&epoch.velocity_covariance_m2_s2),
-        attitude_cov_deg2: triangle(&epoch.attitude_covariance_rad2).map(|v| v * 1f64.to_degrees().powi(2)),
+        attitude_cov_deg2: deg2(&epoch.attitude_covariance_rad2),
         velocity_cov_m2ps2: triangle(&epoch.velocity_covariance_m2_s2),
         position_cov_m2: triangle(&epoch.position_covariance_m2),
         gyro_bias_deg_h: per_hour(epoch.corrections.gyro_bias.into_inner()),
@@ -214,6 +224,8 @@ fn state(fused: &Fused, epoch: &Epoch, phase: Phase) -> StateRecord {
         limb_latitude_sigma_km: epoch.limb_latitude_sigma_km,
         cameras: fused.cameras.iter().zip(&epoch.cameras).zip(&fused.told_mounts).map(camera).collect(),
         verdict: fused.verdict.level().name(),
+        unaided_q_wxyz: epoch.unaided.map(|unaided| unaided.attitude.wxyz()),
+        unaided_cov_deg2: epoch.unaided.map(|unaided| deg2(&unaided.covariance_rad2)),
     }
 }
 

@@ -1,12 +1,13 @@
 //! Simulated flights through `fuse`: right ones, and ones whose data misbehave.
 
 use crate::common::{flight, scene};
+use crate::solve::drawn;
 use hzn_fuse::finding::Source;
 use hzn_fuse::flight::Wanted;
 use hzn_fuse::input::{Attitude, Body, Centre, Inputs};
 use hzn_fuse::results::Kind;
 use hzn_fuse::settings::Limb;
-use hzn_fuse::{Fused, Settings, fuse, truth};
+use hzn_fuse::{Fused, Settings, fuse, sink, truth};
 use hzn_nav::frames::{Cam, Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_sim::Scenario;
 
@@ -98,6 +99,47 @@ fn way_back_ends_at_the_spin(fused: &Fused, scene: &Scenario) {
     }
     let sigma = |epoch: &hzn_fuse::results::Epoch| epoch.attitude_sigma_rad().norm();
     assert!(fused.back.len() > 20 && sigma(first) > sigma(fused.back.last().unwrap()));
+}
+
+/// The solution without any aid begins with that of the filter, and its covariance covers its errors, which are those
+/// of the first attitude and of the gyros.
+#[test]
+fn the_attitude_without_aid_has_its_own_covariance() {
+    let (mut nees, mut last) = (Vec::new(), 0.0);
+    for seed in 1.. {
+        let (scene, inputs) = drawn(seed);
+        let wanted = Wanted { rate_hz: Some(1.0), ..Wanted::default() };
+        let Ok(fused) = fuse(&inputs, &Settings::default(), wanted) else { continue };
+        let unaided = |i: usize| fused.epochs[i].unaided.unwrap();
+        let sigma = |i: usize| unaided(i).covariance_rad2.as_inner().trace().sqrt();
+        assert!(unaided(0).attitude.angle_to(&fused.epochs[0].state.attitude) < 1e-9);
+        assert!((sigma(0) / fused.epochs[0].attitude_covariance_rad2.as_inner().trace().sqrt() - 1.0).abs() < 1e-6);
+        let path = scene.path().unwrap();
+        for i in [fused.epochs.len() / 2, fused.epochs.len() - 1] {
+            let (_, attitude) = true_state(&path, fused.epochs[i].state.time_s);
+            let error = (unaided(i).attitude.inverse() * attitude).scaled_axis();
+            let information = unaided(i).covariance_rad2.as_inner().try_inverse().unwrap();
+            nees.push(error.as_inner().dot(&(information * error.as_inner())));
+            assert!(sigma(i) > sigma(0));
+        }
+        last = sigma(fused.epochs.len() - 1).to_degrees();
+        let mut table = Vec::new();
+        sink::write_states(&fused, &mut table).unwrap();
+        let mut table = csv::Reader::from_reader(table.as_slice());
+        let header = table.headers().unwrap().clone();
+        let place = |name: &str| header.iter().position(|column| column == name).unwrap();
+        let row = table.records().map(Result::unwrap).filter(|row| &row[1] == "filter").last().unwrap();
+        let cell = |name: &str| row[place(name)].parse::<f64>().unwrap();
+        let [w, .., z] = unaided(fused.epochs.len() - 1).attitude.wxyz();
+        assert_eq!([cell("unaided_qw"), cell("unaided_qz")], [w, z]);
+        let variance = ["xx", "yy", "zz"].map(|axes| cell(&format!("unaided_cov_{axes}_deg2"))).iter().sum::<f64>();
+        assert!((variance.sqrt() / last - 1.0).abs() < 1e-6);
+        if nees.len() >= 6 {
+            break;
+        }
+    }
+    println!("NEES {nees:.2?}, sigma at the end {last:.2} deg");
+    assert!(nees.iter().all(|nees| *nees < 16.0), "{nees:?}");
 }
 
 #[test]

@@ -71,7 +71,7 @@ fn marginals_are_those_of_the_dense_inverse() {
 }
 
 /// Returns the inputs of a flight whose mounts, biases, clocks and limb height are drawn from the settings.
-fn drawn(seed: u64) -> (Scenario, Inputs) {
+pub(crate) fn drawn(seed: u64) -> (Scenario, Inputs) {
     drawn_with(seed, &mut Slow::new(seed, 0.1))
 }
 
@@ -97,7 +97,7 @@ pub(crate) fn own() -> Settings {
     own
 }
 
-fn solved() -> Wanted {
+pub(crate) fn solved() -> Wanted {
     Wanted { solved: true, rate_hz: Some(2.0), ..Wanted::default() }
 }
 

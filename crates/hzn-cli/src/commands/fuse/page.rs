@@ -136,7 +136,8 @@ fn rates(fused: &Fused) -> Chart {
 fn unaided(fused: &Fused) -> Chart {
     let turned = |i: usize| {
         move |e: &Epoch| {
-            let turned = e.unaided.map(|unaided| (unaided.inverse() * e.state.attitude).scaled_axis().xyz()[i]);
+            let turned =
+                e.unaided.map(|unaided| (unaided.attitude.inverse() * e.state.attitude).scaled_axis().xyz()[i]);
             turned.map_or(f64::NAN, f64::to_degrees)
         }
     };
