@@ -8,7 +8,7 @@ use crate::exit::{Stop, usage};
 
 /// The tables of hzn, by some of their columns, with their name and the command that reads them. The first one that has
 /// all columns is right.
-const TABLES: [(&[&str], &str, &str); 10] = [
+const TABLES: [(&[&str], &str, &str); 11] = [
     (
         &["index", "body", "status"],
         "results of hzn run",
@@ -22,6 +22,7 @@ const TABLES: [(&[&str], &str, &str); 10] = [
     (&["file", "u_px", "v_px", "error_u_px"], "residuals of a lens calibration", "hzn view shows them"),
     (&["u_px", "v_px"], "a table of points", "hzn calibrate points reads it"),
     (&["file", "accel_x_mps2"], "a table of the tilts of a board", "hzn calibrate mount reads it"),
+    (&["ref_x", "ref_y", "ref_z"], "a table of directions of a sensor", "hzn fuse --direction reads it"),
     (&["gyro_x_radps"], "a table of an inertial unit (imu.csv)", "hzn fuse --imu reads it"),
     (&["x_m", "vx_mps", "qw"], "the truth of a vehicle (vehicle.csv)", "hzn fuse --truth reads it"),
     (&["x_m", "vx_mps"], "a table of a receiver (gnss.csv)", "hzn fuse --gnss reads it"),

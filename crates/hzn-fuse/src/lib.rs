@@ -2,7 +2,7 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`input`] | the files: inertial unit, receiver, star tracker, recordings of `hzn run`, mounts |
+//! | [`input`] | the files: inertial unit, receiver, star tracker, other directions, recordings of `hzn run`, mounts |
 //! | [`settings`] | fuse.toml: what the filter estimates, considers, or leaves out |
 //! | [`flight`] | the replay of a flight |
 //! | [`truth`] | errors against the truth of a simulated flight |

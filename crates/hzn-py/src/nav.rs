@@ -106,6 +106,7 @@ pub(crate) fn fuse<'py>(
     mounts: BTreeMap<String, Rows>,
     clocks: BTreeMap<String, f64>,
     tables: (Vec<String>, Option<String>),
+    directions: Vec<PathBuf>,
     given: &Bound<'py, PyAny>,
     wanted: (bool, bool, bool),
     rate_hz: f64,
@@ -117,6 +118,10 @@ pub(crate) fn fuse<'py>(
         recording.lost.as_ref().map_or(Ok(()), |lost| errors::warn(py, lost))?;
         inputs.recordings.push(recording);
     }
+    let map = Map::parse(tables.0.iter().map(String::as_str)).map_err(to_exception)?;
+    for path in &directions {
+        inputs.recordings.push(input::directions(path, &map).map_err(to_exception)?);
+    }
     for (name, rows) in &mounts {
         let found = inputs.recordings.iter_mut().find(|r| r.name == *name);
         let recording = found.ok_or_else(|| errors::config(format!("mounts: there is no camera {name:?}")))?;
@@ -127,7 +132,7 @@ pub(crate) fn fuse<'py>(
         let recording = found.ok_or_else(|| errors::config(format!("clocks: there is no camera {name:?}")))?;
         recording.clock_offset_s = *offset_s;
     }
-    let read = read_tables(&mut inputs, [imu.as_ref(), gnss.as_ref(), attitude.as_ref()], &tables)?;
+    let read = read_tables(&mut inputs, [imu.as_ref(), gnss.as_ref(), attitude.as_ref()], (&map, tables.1.as_deref()))?;
     let (smoothed, solved, points) = wanted;
     let wanted = Wanted { smoothed, solved, points, rate_hz: Some(rate_hz) };
     let fused = errors::detached(py, || hzn_fuse::fuse(&inputs, &settings, wanted))?.map_err(to_exception)?;
@@ -154,18 +159,17 @@ pub(crate) fn fuse<'py>(
 fn read_tables(
     inputs: &mut Inputs,
     [imu, gnss, attitude]: [Option<&PathBuf>; 3],
-    (columns, utc): &(Vec<String>, Option<String>),
+    (map, utc): (&Map, Option<&str>),
 ) -> PyResult<Vec<String>> {
-    let map = Map::parse(columns.iter().map(String::as_str)).map_err(to_exception)?;
-    let utc = utc.as_deref().map(Utc::parse).transpose().map_err(to_exception)?;
+    let utc = utc.map(Utc::parse).transpose().map_err(to_exception)?;
     if let Some(path) = imu {
-        inputs.imu = input::imu(path, &map).map_err(to_exception)?;
+        inputs.imu = input::imu(path, map).map_err(to_exception)?;
     }
     if let Some(path) = attitude {
-        inputs.attitudes = input::attitudes(path, &map).map_err(to_exception)?;
+        inputs.attitudes = input::attitudes(path, map).map_err(to_exception)?;
     }
     let Some(path) = gnss else { return Ok(Vec::new()) };
-    let receiver = input::gnss(path, &map, utc.map(|utc| utc.unix_s)).map_err(to_exception)?;
+    let receiver = input::gnss(path, map, utc.map(|utc| utc.unix_s)).map_err(to_exception)?;
     inputs.gnss = receiver.fixes;
     Ok(receiver.notes)
 }

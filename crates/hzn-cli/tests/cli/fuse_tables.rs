@@ -68,6 +68,7 @@ fn tables_of_others_give_the_same_flight() {
         (&["--map", "imu:time=t_ms,ms"][..], "log.csv: there is no column t_ms for time; did you mean t_us?"),
         (&["--map", "imu:time=t_us,hours"], "the unit \"hours\" is unknown; time can be in s, ms, us, ns"),
         (&["--map", "attitude:time=t"], "--map attitude:... needs --attitude FILE"),
+        (&["--map", "direction:time=t"], "--map direction:... needs --direction FILE"),
         (
             &[
                 "--map",
@@ -86,4 +87,42 @@ fn tables_of_others_give_the_same_flight() {
         let (code, _, stderr) = run(&[&files[..], more].concat());
         assert!(code == 2 && stderr.contains(words) && !at.join("none.csv").exists(), "{stderr}");
     }
+}
+
+/// A beacon at a known place is one more sensor, and an orbit that `hzn fuse` wrote replaces the receiver.
+#[test]
+fn other_sensors_and_orbits_are_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    flight(at);
+    let mut beacon = String::from("time_s,x,y,z,ref_x,ref_y,ref_z,sigma_deg\n");
+    for row in std::fs::read_to_string(at.join("vehicle.csv")).unwrap().lines().skip(1).step_by(20) {
+        let cell: Vec<f64> = row.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect();
+        let q = nalgebra::Quaternion::new(cell[7], cell[8], cell[9], cell[10]);
+        let seen = nalgebra::UnitQuaternion::from_quaternion(q).inverse() * nalgebra::Vector3::new(0.0, 3.0, 4.0);
+        beacon += &format!("{},{},{},{},0,3,4,0.2\n", cell[0], seen.x, seen.y, seen.z);
+    }
+    std::fs::write(at.join("beacon.csv"), beacon).unwrap();
+    let cameras = ["--nadir", "left.csv", "--nadir", "right.csv", "--truth", "vehicle.csv", "--imu", "imu.csv"];
+    let run = |more: &[&str]| bare(at, &[&cameras[..], &MOUNTS, more].concat());
+    let utc = ["--utc", "2019-06-13T04:00:00Z"];
+    let files = ["--direction", "beacon.csv", "--gnss", "gnss.csv", "-o", "nav.csv", "--oem", "nav.oem", "--solve"];
+    let (code, stdout, stderr) = run(&[&utc[..], &files].concat());
+    assert_eq!(code, 0, "{stdout}{stderr}");
+    for words in ["beacon, direction", "mount of beacon", "clock of beacon"] {
+        assert!(stdout.contains(words), "{words} in {stdout}");
+    }
+    let table = std::fs::read_to_string(at.join("nav.csv")).unwrap();
+    assert!(
+        table.lines().next().unwrap().contains("verdict,unaided_qw,unaided_qx,unaided_qy,unaided_qz,unaided_cov_xx")
+    );
+    // The orbit begins with the solve's first state, and the flight has its position from there.
+    let (code, again, stderr) = run(&[&utc[..], &["--gnss", "nav.oem", "-o", "again.csv"]].concat());
+    assert_eq!(code, 0, "{again}{stderr}");
+    assert!(stderr.contains("states; times count from --utc"), "{stderr}");
+    let (_, metres) = told_errors(&again, "filter");
+    assert!(metres < 100.0, "{again}");
+    let (code, _, stderr) =
+        bare(at, &["--direction", "beacon.csv", "--attitude", "none.csv", "--solve", "-o", "x.csv"]);
+    assert!(code == 2 && stderr.contains("--direction needs --imu FILE"), "{stderr}");
 }

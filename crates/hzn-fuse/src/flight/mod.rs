@@ -249,7 +249,7 @@ fn replay<const N: usize>(flight: &Flight<'_>, settings: &Settings, wanted: Want
 /// Returns the mounts of all recordings.
 fn mounts(recordings: &[Recording]) -> Result<Vec<Rotation<Cam, Vehicle>>, Error> {
     if recordings.len() > MAX_CAMERAS {
-        let what = "recordings of cameras; the filter has memory for";
+        let what = "recordings of cameras and tables of directions; the filter has memory for";
         return Err(Error::unusable(format!("{} {what} {MAX_CAMERAS}", recordings.len())));
     }
     let mut mounts: Vec<Rotation<Cam, Vehicle>> = Vec::new();
@@ -267,7 +267,9 @@ fn mounts(recordings: &[Recording]) -> Result<Vec<Rotation<Cam, Vehicle>>, Error
                 let what = "have the same rows: give each recording once, or the other camera's file";
                 return Err(Error::unusable(format!("{} and {name} {what}", other.name)));
             }
-            if known.angle_to(&mount) < SAME_MOUNT_RAD && overlap(other, one) {
+            // Several sensors of directions have the vehicle's axes.
+            let are_cameras = !one.is_table && !other.is_table;
+            if are_cameras && known.angle_to(&mount) < SAME_MOUNT_RAD && overlap(other, one) {
                 let what =
                     "have the same mount, but took pictures at the same time: two cameras cannot. Correct one with";
                 return Err(Error::unusable(format!("{} and {name} {what} --mount {name}=FILE", other.name)));

@@ -124,8 +124,25 @@ pub(super) const ATTITUDE: Columns = Columns {
     groups: &[("q", &["qw", "qx", "qy", "qz"])],
 };
 
+/// A sensor of a direction.
+pub(super) const DIRECTION: Columns = Columns {
+    table: "direction",
+    columns: &[
+        column("time_s", "time", Measure::Time),
+        column("x", "x", Measure::Number),
+        column("y", "y", Measure::Number),
+        column("z", "z", Measure::Number),
+        column("ref_x", "ref_x", Measure::Number),
+        column("ref_y", "ref_y", Measure::Number),
+        column("ref_z", "ref_z", Measure::Number),
+        column("sigma_deg", "sigma", Measure::Angle),
+        column("noise_deg", "noise", Measure::Angle),
+    ],
+    groups: &[("measured", &["x", "y", "z"]), ("reference", &["ref_x", "ref_y", "ref_z"])],
+};
+
 /// All tables.
-pub(super) const TABLES: [&Columns; 3] = [&IMU, &GNSS, &ATTITUDE];
+pub(super) const TABLES: [&Columns; 4] = [&IMU, &GNSS, &ATTITUDE, &DIRECTION];
 
 impl Columns {
     /// Returns the columns that a name in a map means: one, those of a group, or none.

@@ -1,4 +1,4 @@
-//! Positions and velocities of a satellite navigation receiver: a table (gnss.csv) or NMEA 0183.
+//! Positions and velocities of a satellite navigation receiver: a table (gnss.csv), NMEA 0183, or an orbit (OEM).
 
 use std::path::Path;
 
@@ -8,6 +8,7 @@ use super::columns::GNSS;
 use super::fix::{Fix, Receiver, ecef_m};
 use super::map::Map;
 use super::nmea;
+use super::oem;
 use super::table::Table;
 use crate::error::Error;
 
@@ -21,9 +22,13 @@ use crate::error::Error;
 /// A file that begins with `$` is NMEA 0183, with the sentences GGA or GNS. The date is that of RMC or ZDA. Times are
 /// counted from `utc_unix_s`, the UTC of time 0 in seconds since 1970; without it they are those seconds themselves.
 ///
+/// A file that begins with `CCSDS_OEM_VERS` is an orbit ephemeris message in keyword = value notation, in a frame that
+/// turns with the Earth. Its times count from `utc_unix_s`, too, and its covariances are the sigmas. States that are at
+/// most two minutes apart are filled in.
+///
 /// # Errors
 /// The file cannot be read, a column is missing or there twice, a cell is not a number, or a latitude or longitude is
-/// impossible; no sentence has a position.
+/// impossible; no sentence has a position; the message is XML, in another frame, or damaged.
 ///
 /// ```
 /// use hzn_fuse::input::{Map, gnss};
@@ -42,6 +47,13 @@ pub fn gnss(path: &Path, map: &Map, utc_unix_s: Option<f64>) -> Result<Receiver,
             return Err(Error::unusable(format!("{}: {what}", path.display())));
         }
         return nmea::read(path, utc_unix_s);
+    }
+    if oem::is_oem(path)? {
+        if map.has(GNSS.table) {
+            let what = "is a message of CCSDS, which has no columns: leave out --map gnss:...";
+            return Err(Error::unusable(format!("{}: {what}", path.display())));
+        }
+        return oem::read(path, utc_unix_s);
     }
     let table = Table::read(path, &GNSS, map)?;
     table.require(&["time"])?;

@@ -37,9 +37,9 @@ pub struct Map {
 }
 
 impl Map {
-    /// Reads entries `TABLE:NAME=COLUMN,UNIT`. TABLE is `imu`, `gnss` or `attitude`. NAME is that of a column without
-    /// its unit, such as `time` or `gyro_x`, or of several, such as `gyro`, for which COLUMN is `A:B:C`. Without a
-    /// unit the column has that of its name.
+    /// Reads entries `TABLE:NAME=COLUMN,UNIT`. TABLE is `imu`, `gnss`, `attitude` or `direction`. NAME is that of a
+    /// column without its unit, such as `time` or `gyro_x`, or of several, such as `gyro`, for which COLUMN is `A:B:C`.
+    /// Without a unit the column has that of its name.
     ///
     /// # Errors
     /// A table, a name or a unit is unknown, or a name or a column comes twice.

@@ -3,12 +3,14 @@
 mod attitudes;
 mod columns;
 mod cone;
+mod directions;
 mod fix;
 mod gnss;
 mod imu;
 mod map;
 mod mount;
 mod nmea;
+mod oem;
 mod recording;
 mod table;
 
@@ -17,6 +19,7 @@ use nalgebra::Quaternion;
 
 pub use attitudes::{Attitude, attitudes};
 pub use cone::FreeCone;
+pub use directions::directions;
 pub use fix::{Fix, Receiver};
 pub use gnss::gnss;
 pub use imu::{Sample, imu};
@@ -41,7 +44,7 @@ pub struct Inputs {
     pub gnss: Vec<Fix>,
     /// Attitudes of a star tracker.
     pub attitudes: Vec<Attitude>,
-    /// Results of `hzn run`, one of each camera.
+    /// Results of `hzn run`, one of each camera, and the directions of other sensors.
     pub recordings: Vec<Recording>,
 }
 

@@ -27,6 +27,8 @@ pub enum Body {
     Sun,
     /// The Moon.
     Moon,
+    /// What another sensor measures: the magnetic field, a beacon, or the Sun.
+    Other,
 }
 
 impl Body {
@@ -36,6 +38,7 @@ impl Body {
             Self::Limb => "limb",
             Self::Sun => "sun",
             Self::Moon => "moon",
+            Self::Other => "direction",
         }
     }
 }
@@ -82,9 +85,11 @@ pub struct Seen {
 pub struct Recording {
     /// Name of the camera: that of the file without its ending.
     pub name: String,
+    /// Whether it is a table of directions in the vehicle's axes, and not of a camera.
+    pub is_table: bool,
     /// The mount; `None` if the recording does not have it.
     pub mount: Option<Rotation<Cam, Vehicle>>,
-    /// The lens, if the recording has a sensor.toml.
+    /// The lens, if the recording has a sensor.toml. The joint answers of a rig have no lens of their own.
     pub camera: Option<camera::Config>,
     /// 1-sigma of the limb height that the sensor was told, km.
     pub limb_sigma_km: Option<f64>,
@@ -161,7 +166,7 @@ impl Recording {
         let mut recording = Self {
             name,
             mount: if is_rig { Some(Rotation::identity()) } else { told },
-            camera: config.map(|c| c.camera.clone()),
+            camera: config.filter(|_| !is_rig).map(|c| c.camera.clone()),
             limb_sigma_km,
             // The default stands for a position from a receiver; with a told altitude nobody has said it.
             altitude_sigma_km: largest(|b| b.altitude_sigma_km).filter(|sigma_km| *sigma_km != not_told_km),

@@ -242,7 +242,7 @@ fn of_body(
             time_s,
             camera: number,
             window: 0,
-            is_celestial: seen.body != Body::Limb,
+            is_celestial: matches!(seen.body, Body::Sun | Body::Moon),
             measured: measured.into_inner(),
             by_height: seen.by_limb_height.into_inner(),
             mount: camera.mount.into_inner(),

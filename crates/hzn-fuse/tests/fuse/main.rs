@@ -3,7 +3,9 @@
 mod clocks;
 mod common;
 mod common_part;
+mod directions;
 mod flight;
+mod oem;
 mod orbit;
 mod points;
 mod recordings;

@@ -1492,6 +1492,7 @@ def _fuse_flight(
     mounts: dict[str, _Rows],
     clocks: dict[str, float],
     tables: tuple[list[str], str | None],
+    directions: list[str],
     given: dict[str, Any],
     wanted: tuple[bool, bool, bool],
     rate_hz: float,

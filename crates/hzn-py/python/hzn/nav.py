@@ -264,6 +264,7 @@ def fuse(
     imu: str | PathLike[str],
     gnss: str | PathLike[str] | None = None,
     attitude: str | PathLike[str] | None = None,
+    directions: Sequence[str | PathLike[str]] = (),
     mounts: Mapping[str, ArrayLike] | None = None,
     clocks: Mapping[str, float] | None = None,
     columns: Sequence[str] = (),
@@ -280,8 +281,11 @@ def fuse(
         Results of ``hzn run``, one file for each camera (.mcap, .csv, .jsonl); the name of a camera is that of its file.
     imu, gnss, attitude
         Tables of the inertial unit, the receiver and a star tracker, with the columns of ``hzn fuse``; the file of the
-        receiver may be NMEA 0183. With a star tracker, the attitude needs neither a receiver nor recordings; without a
+        receiver may be NMEA 0183 or an orbit ephemeris message (OEM). With a star tracker, the attitude needs neither a receiver nor recordings; without a
         receiver the position is not known.
+    directions
+        Tables of other sensors of a direction (magnetometer, Sun sensor, antenna) with the columns of ``hzn fuse
+        --direction``; the name of a sensor is that of its file.
     mounts
         Mounts by the name of the camera, shape (3, 3), instead of those of the recordings.
     clocks
@@ -289,7 +293,7 @@ def fuse(
     columns
         Columns with other names or units, as ``--map`` of ``hzn fuse``: ``["imu:time=t_us,us"]``.
     utc
-        UTC of time 0, such as ``"2019-06-13T04:00:00Z"``, from which the times of NMEA count.
+        UTC of time 0, such as ``"2019-06-13T04:00:00Z"``, from which the times of NMEA and OEM count.
     settings
         Sections and keys of a fuse.toml that differ from the defaults.
     smooth
@@ -312,7 +316,7 @@ def fuse(
     """
     wanted = (smooth, False, False)
     tables = (columns, utc)
-    return _replay(recordings, imu, gnss, attitude, mounts, clocks, tables, settings, wanted, rate_hz)
+    return _replay(recordings, imu, gnss, attitude, directions, mounts, clocks, tables, settings, wanted, rate_hz)
 
 
 def solve(
@@ -321,6 +325,7 @@ def solve(
     imu: str | PathLike[str] | None = None,
     gnss: str | PathLike[str] | None = None,
     attitude: str | PathLike[str] | None = None,
+    directions: Sequence[str | PathLike[str]] = (),
     mounts: Mapping[str, ArrayLike] | None = None,
     clocks: Mapping[str, float] | None = None,
     columns: Sequence[str] = (),
@@ -340,7 +345,7 @@ def solve(
 
     Parameters
     ----------
-    recordings, imu, gnss, attitude, mounts, clocks, columns, utc, settings, rate_hz
+    recordings, imu, gnss, attitude, directions, mounts, clocks, columns, utc, settings, rate_hz
         The same as for `fuse`; only here may ``imu`` be left out.
     points
         Use what all edge points of a limb say, the cone that was fitted to them with a free half-angle, instead of the
@@ -367,7 +372,7 @@ def solve(
     """
     wanted = (False, True, points)
     tables = (columns, utc)
-    return _replay(recordings, imu, gnss, attitude, mounts, clocks, tables, settings, wanted, rate_hz)
+    return _replay(recordings, imu, gnss, attitude, directions, mounts, clocks, tables, settings, wanted, rate_hz)
 
 
 def _replay(
@@ -375,6 +380,7 @@ def _replay(
     imu: str | PathLike[str] | None,
     gnss: str | PathLike[str] | None,
     attitude: str | PathLike[str] | None,
+    directions: Sequence[str | PathLike[str]],
     mounts: Mapping[str, ArrayLike] | None,
     clocks: Mapping[str, float] | None,
     tables: tuple[Sequence[str], str | None],
@@ -390,6 +396,7 @@ def _replay(
         {name: _list(mount, (3, 3), f"mounts[{name!r}]") for name, mount in (mounts or {}).items()},
         dict(clocks or {}),
         (list(tables[0]), tables[1]),
+        [str(path) for path in directions],
         dict(settings or {}),
         wanted,
         rate_hz,

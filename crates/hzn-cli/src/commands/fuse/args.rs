@@ -15,23 +15,30 @@ use hzn_fuse::sink::AemVersion;
 pub(crate) struct Args {
     /// Results of `hzn run` of one camera (.mcap, .csv, .jsonl); once for each camera. The name of a camera is that of
     /// its file without the ending. A star tracker can replace them
-    #[arg(long, value_name = "FILE", required_unless_present_any = ["show_config", "attitude"])]
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["show_config", "attitude", "direction"])]
     pub(super) nadir: Vec<PathBuf>,
     /// Samples of the inertial unit: time_s, gyro_{x,y,z}_radps, accel_{x,y,z}_mps2, saturated. Without it, --solve
     /// finds the orbit of a satellite from limbs and a star tracker
     #[arg(long, value_name = "CSV")]
     pub(super) imu: Option<PathBuf>,
-    /// Fixes of the receiver: NMEA 0183, or a table with time_s and either x_m, y_m, z_m (ECEF) or lat_deg, lon_deg,
-    /// height_m (above WGS-84). Velocities vx_mps, vy_mps, vz_mps, or v_north_mps, v_east_mps and v_down_mps or
-    /// v_up_mps, and sigmas position_sigma_m, velocity_sigma_mps, horizontal_sigma_m, vertical_sigma_m may be left out.
-    /// With a star tracker the attitude needs no receiver; the position is then not known
+    /// Fixes of the receiver: NMEA 0183, a CCSDS orbit ephemeris message (OEM) in KVN and ITRF, or a table with time_s
+    /// and either x_m, y_m, z_m (ECEF) or lat_deg, lon_deg, height_m (above WGS-84). Velocities vx_mps, vy_mps, vz_mps,
+    /// or v_north_mps, v_east_mps and v_down_mps or v_up_mps, and sigmas position_sigma_m, velocity_sigma_mps,
+    /// horizontal_sigma_m, vertical_sigma_m may be left out. With a star tracker the attitude needs no receiver; the
+    /// position is then not known
     #[arg(long, value_name = "FILE")]
     pub(super) gnss: Option<PathBuf>,
     /// Attitudes of a star tracker: time_s, qw, qx, qy, qz (vehicle to ECEF), sigma_deg
     #[arg(long, value_name = "CSV")]
     pub(super) attitude: Option<PathBuf>,
-    /// A column of a table that somebody else wrote, once for each: TABLE (imu, gnss, attitude), what it is, its name
-    /// in the file, and its unit if that is another. Several names with colons mean the three axes:
+    /// Directions of another sensor, such as a magnetometer, a Sun sensor or an antenna; once for each: time_s, the
+    /// measured x, y, z along the vehicle's axes, the same direction in ECEF ref_x, ref_y, ref_z, sigma_deg, and maybe
+    /// noise_deg, the part of it that is new in every row. Its name is that of its file without the ending, and it has
+    /// the settings, the mount and the clock of a camera
+    #[arg(long, value_name = "CSV")]
+    pub(super) direction: Vec<PathBuf>,
+    /// A column of a table that somebody else wrote, once for each: TABLE (imu, gnss, attitude, direction), what it is,
+    /// its name in the file, and its unit if that is another. Several names with colons mean the three axes:
     /// --map imu:time=t_us,us --map imu:gyro=wx:wy:wz,deg/s. A wrong name is answered with all right ones
     #[arg(long, value_name = "TABLE:NAME=COLUMN,UNIT")]
     pub(super) map: Vec<String>,
@@ -64,7 +71,8 @@ pub(crate) struct Args {
     /// The attitude as a SPICE CK of type 3 (FILE.bc), with FILE.tsc and FILE.tf next to it; it needs --utc
     #[arg(long, value_name = "FILE", requires = "utc")]
     pub(super) ck: Option<PathBuf>,
-    /// UTC of time 0 of the inertial unit, for example 2019-06-13T04:00:00Z; the times of NMEA count from it
+    /// UTC of time 0 of the inertial unit, for example 2019-06-13T04:00:00Z; the times of NMEA and of an OEM count from
+    /// it
     #[arg(long, value_name = "TIME")]
     pub(super) utc: Option<String>,
     /// Name of the vehicle in the AEM and the OEM
@@ -110,7 +118,7 @@ impl Args {
     pub(super) fn inputs(&self) -> Vec<PathBuf> {
         let tables = [&self.imu, &self.gnss, &self.attitude, &self.config, &self.truth];
         let mounts = self.mount.iter().map(|(_, file)| PathBuf::from(file));
-        self.nadir.iter().chain(tables.into_iter().flatten()).cloned().chain(mounts).collect()
+        self.nadir.iter().chain(&self.direction).chain(tables.into_iter().flatten()).cloned().chain(mounts).collect()
     }
 }
 
@@ -124,8 +132,11 @@ impl Args {
             Source::Camera(name) => {
                 let mount =
                     self.mount.iter().filter(|_| finding.cause == Cause::Mount).find(|(camera, _)| camera == name);
-                let recording =
-                    self.nadir.iter().find(|path| path.file_stem().is_some_and(|stem| stem == name.as_str()));
+                let recording = self
+                    .nadir
+                    .iter()
+                    .chain(&self.direction)
+                    .find(|path| path.file_stem().is_some_and(|stem| stem == name.as_str()));
                 mount.map(|(_, file)| Path::new(file)).or(recording.map(PathBuf::as_path))
             }
             Source::Cameras | Source::All => None,

@@ -46,6 +46,11 @@ pub(super) fn run(args: &Args) -> Outcome {
     if args.gnss.is_none() && args.attitude.is_none() {
         return Err(usage(format!("--gnss FILE or --attitude FILE is missing; {orbit}")));
     }
+    if args.imu.is_none() && !args.direction.is_empty() {
+        return Err(usage(
+            "--direction needs --imu FILE: the orbit of a satellite comes from limbs and a star tracker",
+        ));
+    }
     if args.oem.is_some() && args.imu.is_some() && args.gnss.is_none() {
         return Err(usage("--oem needs --gnss: without a receiver the inertial unit gives no position"));
     }
@@ -103,13 +108,17 @@ fn inputs(args: &Args) -> Result<Inputs, Stop> {
         }
         inputs.recordings.push(recording);
     }
+    let map = Map::parse(args.map.iter().map(String::as_str))?;
+    for path in &args.direction {
+        inputs.recordings.push(input::directions(path, &map)?);
+    }
     let known = names(&inputs);
     for (name, file) in &args.mount {
         let found = inputs.recordings.iter_mut().find(|r| r.name == *name);
         let recording = found.ok_or_else(|| usage(format!("--mount {name}: no such camera; {known}")))?;
         recording.mount = Some(input::mount(Path::new(file))?);
     }
-    tables(args, &mut inputs)?;
+    tables(args, &map, &mut inputs)?;
     for (name, seconds) in &args.clock {
         let offset_s = match seconds.parse::<f64>() {
             Ok(offset) if offset.is_finite() => offset,
@@ -129,26 +138,29 @@ fn inputs(args: &Args) -> Result<Inputs, Stop> {
 }
 
 /// Reads the tables of inertial unit, receiver and star tracker.
-fn tables(args: &Args, inputs: &mut Inputs) -> Result<(), Stop> {
-    let map = Map::parse(args.map.iter().map(String::as_str))?;
-    for (table, is_given) in
-        [("imu", args.imu.is_some()), ("gnss", args.gnss.is_some()), ("attitude", args.attitude.is_some())]
-    {
+fn tables(args: &Args, map: &Map, inputs: &mut Inputs) -> Result<(), Stop> {
+    let given = [
+        ("imu", args.imu.is_some()),
+        ("gnss", args.gnss.is_some()),
+        ("attitude", args.attitude.is_some()),
+        ("direction", !args.direction.is_empty()),
+    ];
+    for (table, is_given) in given {
         if map.has(table) && !is_given {
             return Err(usage(format!("--map {table}:... needs --{table} FILE")));
         }
     }
     if let Some(path) = &args.imu {
-        inputs.imu = input::imu(path, &map)?;
+        inputs.imu = input::imu(path, map)?;
     }
     if let Some(path) = &args.gnss {
         let utc = args.utc.as_deref().map(Utc::parse).transpose()?;
-        let receiver = input::gnss(path, &map, utc.map(|utc| utc.unix_s))?;
+        let receiver = input::gnss(path, map, utc.map(|utc| utc.unix_s))?;
         receiver.notes.iter().for_each(|note| tell::line(format_args!("note: {note}")));
         inputs.gnss = receiver.fixes;
     }
     if let Some(path) = &args.attitude {
-        inputs.attitudes = input::attitudes(path, &map)?;
+        inputs.attitudes = input::attitudes(path, map)?;
     }
     Ok(())
 }

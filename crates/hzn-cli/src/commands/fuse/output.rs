@@ -93,7 +93,7 @@ impl<'a> Outputs<'a> {
             disk::write(path, page)?;
         }
         for (camera, file) in &args.write_frames {
-            let found = inputs.recordings.iter().find(|r| r.name == *camera);
+            let found = inputs.recordings.iter().find(|r| r.name == *camera && !r.is_table);
             let recording =
                 found.ok_or_else(|| usage(format!("--write-frames {camera}: no such camera; {}", names(inputs))))?;
             sink::write_frames(fused, recording, self.utc, create(Path::new(file))?)?;

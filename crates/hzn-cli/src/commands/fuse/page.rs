@@ -86,13 +86,17 @@ fn attitude_sigma(fused: &Fused) -> Chart {
     chart.with_series(Series::new("smoothed, largest", Style::Line, smoothed))
 }
 
+/// The bodies with their names in the charts.
+const BODIES: [(Body, &str); 4] =
+    [(Body::Limb, "limb"), (Body::Sun, "Sun"), (Body::Moon, "Moon"), (Body::Other, "direction")];
+
 fn directions(fused: &Fused, body: Body) -> impl Iterator<Item = &Innovation> {
     fused.innovations.iter().filter(move |i| i.kind == Kind::Direction(body))
 }
 
 fn angles(fused: &Fused) -> Chart {
     let mut chart = over_time("Angle between measured directions and the solution ([BB] figures 37 to 44)", "deg");
-    for (body, name) in [(Body::Limb, "limb"), (Body::Sun, "Sun"), (Body::Moon, "Moon")] {
+    for (body, name) in BODIES {
         if directions(fused, body).next().is_none() {
             continue;
         }
@@ -151,7 +155,7 @@ fn unaided(fused: &Fused) -> Chart {
 fn direction_sigma(fused: &Fused) -> Chart {
     let mut chart = over_time("3 sigma of the directions, as the sensors tell it ([BB] figure 37)", "deg");
     for (camera, name) in fused.cameras.iter().enumerate() {
-        for (body, what) in [(Body::Limb, "limb"), (Body::Sun, "Sun"), (Body::Moon, "Moon")] {
+        for (body, what) in BODIES {
             let points: Vec<(f64, f64)> = directions(fused, body)
                 .filter(|i| i.camera == Some(camera))
                 .filter_map(|i| Some((i.time_s, 3.0 * i.sensor_sigma_rad?.to_degrees())))
