@@ -45,6 +45,26 @@ impl ErrorSetting {
     }
 }
 
+/// An error of a lens. Without a sigma it is that of the recording's sensor.toml; without that the lens is exact.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LensSetting {
+    /// How a solve of the whole flight treats it. With `off` it stays a part of each direction's covariance, as it is
+    /// for the filter.
+    pub mode: Treatment,
+    /// 1-sigma; 0 or more.
+    pub sigma: Option<f64>,
+}
+
+impl LensSetting {
+    const CONSIDERED: Self = Self { mode: Treatment::Considered, sigma: None };
+
+    /// Returns the 1-sigma; `told` is that of the sensor.toml. It is 0 for a parameter that is no unknown.
+    pub(crate) fn sigma_or(&self, told: f64) -> f64 {
+        if self.mode == Treatment::Off { 0.0 } else { self.sigma.unwrap_or(told) }
+    }
+}
+
 fn mode(treatment: Treatment) -> Mode {
     match treatment {
         Treatment::Estimated => Mode::Estimated,
@@ -115,6 +135,10 @@ pub struct Camera {
     pub clock_s: ErrorSetting,
     /// Which measurement the filter takes from a row that has both: the limb's axis, or the position.
     pub limb: Limb,
+    /// Focal length, percent: an unknown of a solve of the whole flight.
+    pub focal_percent: LensSetting,
+    /// Each coordinate of the principal point, px: an unknown of a solve of the whole flight.
+    pub centre_px: LensSetting,
 }
 
 /// The measurement that the filter takes from a row with a limb.
@@ -137,6 +161,8 @@ impl Default for Camera {
             white_rad: 0.005,
             clock_s: ErrorSetting::estimated(0.2),
             limb: Limb::Axis,
+            focal_percent: LensSetting::CONSIDERED,
+            centre_px: LensSetting::CONSIDERED,
         }
     }
 }
@@ -318,6 +344,8 @@ impl Settings {
             all.push(above(&format!("{section} slow_error_time_s"), camera.slow_error_time_s));
             all.push(sigma(&format!("{section} white_rad"), camera.white_rad));
             all.push(sigma(&format!("{section} clock_s"), camera.clock_s.sigma));
+            all.push(sigma(&format!("{section} focal_percent"), camera.focal_percent.sigma.unwrap_or(0.0)));
+            all.push(sigma(&format!("{section} centre_px"), camera.centre_px.sigma.unwrap_or(0.0)));
         }
         match all.into_iter().find(|(_, _, is_valid, _)| !is_valid) {
             Some((key, value, _, rule)) => Err((key, format!("{value} is refused: must be {rule}"))),

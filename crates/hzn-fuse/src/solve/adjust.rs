@@ -20,7 +20,7 @@ const DAMPING: [f64; 2] = [1e-14, 1e8];
 
 /// Solves the problem from the first estimates on.
 pub(crate) fn solve(problem: &Problem<'_>, first: Estimates) -> Result<(Vec<Epoch>, Solved), Error> {
-    let sizes = first.sizes(problem.layout());
+    let sizes = first.sizes(problem.places());
     let errors = problem.errors(&first, Loss::Huber)?;
     let joined: Vec<Vec<usize>> =
         errors.iter().map(|e| e.linear.derivatives.iter().map(|(block, _)| *block).collect()).collect();
@@ -93,7 +93,7 @@ impl<'a> Adjustment<'a> {
         self.factor.compute(normal, damping)?;
         let step: DVector<f64> = self.factor.step(normal);
         let part = |block: usize| step.rows(self.pattern.start(block), self.pattern.size(block)).into_owned();
-        let estimates = self.estimates.moved(self.problem.layout(), part);
+        let estimates = self.estimates.moved(self.problem.places(), part);
         let errors = self.problem.errors(&estimates, loss).ok()?;
         Some((estimates, errors))
     }

@@ -1,6 +1,7 @@
 //! The estimates that the solve begins with: those of the filter.
 
 use hzn_nav::strapdown::Nominal;
+use nalgebra::Vector3;
 
 use super::carried::Carrier;
 use super::estimates::Shared;
@@ -11,7 +12,13 @@ use crate::track::Track;
 
 /// Returns the filter's estimates of the shared errors.
 pub(super) fn shared(track: &Track) -> Shared {
-    Shared { corrections: track.corrections, mounts: track.mounts.clone(), clocks_s: track.clocks_s.clone() }
+    Shared {
+        corrections: track.corrections,
+        mounts: track.mounts.clone(),
+        clocks_s: track.clocks_s.clone(),
+        // The filter does not estimate them.
+        lenses: vec![Vector3::zeros(); track.mounts.len()],
+    }
 }
 
 /// Replaces the attitudes before a new start that shows that they are wrong: the gyros carry that of the new start

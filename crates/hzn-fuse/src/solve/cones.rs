@@ -11,7 +11,9 @@ use hzn_nav::strapdown::Nominal;
 use nalgebra::{DMatrix, DVector, Matrix3, RowVector3, SMatrix, Vector3};
 
 use super::directions::{At, LEAST_WHITE, by_knot, seen};
-use super::estimates::{Estimates, put};
+use super::estimates::{Estimates, put, put_lens};
+use super::lens::{ByLens, Lens};
+use super::places::Places;
 use super::turning::Turning;
 use crate::input::FreeCone;
 use crate::sparse::Linear;
@@ -44,6 +46,8 @@ pub(super) struct Cone {
     axes: Matrix3<f64>,
     /// The inverse factor of the noise on these axes.
     whiten: Matrix3<f64>,
+    /// Derivative of the cone by the error of the lens, if that is unknown.
+    by_lens: Option<ByLens>,
 }
 
 /// The expected cosine with its derivatives by the limb height (1/km) and by the altitude (1/m).
@@ -62,6 +66,7 @@ impl Cone {
         state: &Nominal,
         white_rad: f64,
         slow: Option<usize>,
+        lens: Option<&Lens>,
     ) -> Option<Self> {
         let reference = told.reference.try_normalize(1e-6)?;
         let whole = cone.with_cos_along_axis();
@@ -75,7 +80,14 @@ impl Cone {
         let noise = Matrix3::from_diagonal(&Vector3::new(white, white, white_cos).map(|x| x * x));
         let share = if slow.is_some() { 1.0 - told.slow_share } else { 1.0 };
         let factor = (noise + axes * whole * axes.transpose() * share).cholesky()?.l();
-        let mut root = (whole * told.slow_share).symmetric_eigen();
+        let by_lens = lens.and_then(|lens| Some((lens, lens.by_lens(cone.axis.as_inner(), cone.cos, true)?)));
+        let mut slow_part = whole * told.slow_share;
+        if let Some((lens, by)) = &by_lens {
+            // The cosine takes the place along the axis here, too.
+            let by = by.fixed_rows::<3>(0) + cone.axis.as_inner() * by.row(3);
+            slow_part = lens.without(&slow_part, &by);
+        }
+        let mut root = slow_part.symmetric_eigen();
         root.eigenvalues.apply(|v| *v = v.max(0.0).sqrt());
         Some(Self {
             at,
@@ -86,6 +98,7 @@ impl Cone {
             slow,
             axes,
             whiten: factor.solve_lower_triangular(&Matrix3::identity())?,
+            by_lens: by_lens.map(|(_, by)| by),
         })
     }
 
@@ -105,7 +118,8 @@ impl Cone {
     }
 
     /// Returns the error at the estimates.
-    pub(super) fn error(&self, estimates: &Estimates, layout: &Layout, turning: &Turning) -> Option<Linear> {
+    pub(super) fn error(&self, estimates: &Estimates, all: &Places, turning: &Turning) -> Option<Linear> {
+        let layout = &all.filter;
         let seen = seen(&self.at, estimates, turning, &self.told.reference)?;
         let (knot, places) = (estimates.knots.get(self.at.knot)?, layout.cameras.get(self.at.camera)?);
         let dt = self.at.time_s - knot.time_s;
@@ -131,7 +145,7 @@ impl Cone {
             out.z = cos;
             dense(&(self.whiten * out))
         };
-        let mut by_shared = DMatrix::zeros(3, layout.len - Layout::VEHICLE);
+        let mut by_shared = DMatrix::zeros(3, all.shared());
         put(&mut by_shared, places.misalignment, &rows(seen.by_mount, RowVector3::zeros()));
         put(&mut by_shared, places.clock, &one(&seen.by_clock, 0.0));
         put(&mut by_shared, layout.limb_height, &one(&Vector3::zeros(), cosine.by_limb_height));
@@ -140,6 +154,14 @@ impl Cone {
             let tilt = (seen.to_camera * term.tilt).into_inner();
             put(&mut by_shared, place, &one(&tilt, cosine.by_limb_height * term.height));
         }
+        let mut lens_cos = 0.0;
+        if let Some(by) = &self.by_lens {
+            let (axis, cos) = (by.fixed_rows::<3>(0).into_owned(), by.row(3).into_owned());
+            let error = estimates.shared.lenses.get(self.at.camera)?;
+            put_lens(&mut by_shared, all.lenses.get(self.at.camera), &rows(axis, cos));
+            expected += axis * error;
+            lens_cos = (cos * error).x;
+        }
         let mut by_state = by_knot(&rows(seen.by_attitude, RowVector3::zeros()));
         let up = -self.told.reference.as_inner().transpose() * cosine.by_altitude;
         let by_position = rows(Matrix3::zeros(), up);
@@ -147,7 +169,7 @@ impl Cone {
         by_state.view_mut((0, Layout::POSITION), (3, 3)).copy_from(&by_position);
         let mut derivatives = vec![(self.at.knot, by_state), (estimates.shared_block(), by_shared)];
         let mut error = self.axes * (expected - self.cone.axis.as_inner());
-        error.z = cosine.value - self.cone.cos;
+        error.z = cosine.value + lens_cos - self.cone.cos;
         if let Some(slow) = self.slow {
             let by_slow = self.axes * self.root;
             error += by_slow * estimates.slow.get(slow)?;

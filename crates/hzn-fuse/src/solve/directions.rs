@@ -11,7 +11,8 @@ use hzn_nav::layout::Layout;
 use hzn_nav::strapdown::Nominal;
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, SMatrix, Vector3};
 
-use super::estimates::{Estimates, put};
+use super::estimates::{Estimates, put, put_lens};
+use super::places::Places;
 use super::turning::Turning;
 use crate::input::Centre;
 use crate::sparse::Linear;
@@ -34,6 +35,8 @@ pub(super) struct Direction {
     measured: Vector<Cam>,
     reference: Vector<Fixed>,
     by_limb_height: Vector<Cam>,
+    /// Derivative of the measured axis by the error of the lens, if that is unknown.
+    pub(super) by_lens: Option<Matrix3<f64>>,
     /// The effect of a limb height that changes with the latitude.
     latitude: Option<[LatitudeTerm; 2]>,
     root: Matrix3<f64>,
@@ -63,14 +66,16 @@ impl Direction {
         let factor = noise.cholesky().ok_or(Unusable::NegativeVariance)?.l();
         let across = factor.solve_lower_triangular(&axes).ok_or(Unusable::NegativeVariance)?;
         let latitude = LatitudeTerm::both(position_m).filter(|_| m.is_limb);
-        Ok(Self { at, measured, reference, by_limb_height: m.by_limb_height, latitude, root, slow, across })
+        let by_limb_height = m.by_limb_height;
+        Ok(Self { at, measured, reference, by_limb_height, by_lens: None, latitude, root, slow, across })
     }
 
     /// Returns the error at the estimates.
-    pub(super) fn error(&self, estimates: &Estimates, layout: &Layout, turning: &Turning) -> Option<Linear> {
+    pub(super) fn error(&self, estimates: &Estimates, all: &Places, turning: &Turning) -> Option<Linear> {
+        let layout = &all.filter;
         let seen = seen(&self.at, estimates, turning, &self.reference)?;
         let places = layout.cameras.get(self.at.camera)?;
-        let mut by_shared = DMatrix::zeros(2, layout.len - Layout::VEHICLE);
+        let mut by_shared = DMatrix::zeros(2, all.shared());
         let dense = |matrix: SMatrix<f64, 2, 3>| DMatrix::from_column_slice(2, 3, matrix.as_slice());
         let column = |v: &Vector3<f64>| DMatrix::from_column_slice(2, 1, (self.across * v).as_slice());
         put(&mut by_shared, places.misalignment, &dense(self.across * seen.by_mount));
@@ -88,6 +93,10 @@ impl Direction {
                 put(&mut by_shared, Some(one), &column(&by));
                 expected += by * coefficient;
             }
+        }
+        if let Some(by) = self.by_lens {
+            put_lens(&mut by_shared, all.lenses.get(self.at.camera), &dense(self.across * by));
+            expected += by * estimates.shared.lenses.get(self.at.camera)?;
         }
         let mut derivatives = vec![
             (self.at.knot, by_knot(&dense(self.across * seen.by_attitude))),
@@ -153,7 +162,8 @@ impl CentreSeen {
     }
 
     /// Returns the error at the estimates.
-    pub(super) fn error(&self, estimates: &Estimates, layout: &Layout, turning: &Turning) -> Option<Linear> {
+    pub(super) fn error(&self, estimates: &Estimates, all: &Places, turning: &Turning) -> Option<Linear> {
+        let layout = &all.filter;
         let knot = estimates.knots.get(self.at.knot)?;
         let dt = self.at.time_s - knot.time_s;
         let to_centre = -(knot.position_m + knot.velocity_m_s * dt);
@@ -161,7 +171,7 @@ impl CentreSeen {
         let places = layout.cameras.get(self.at.camera)?;
         let dense = |matrix: Matrix3<f64>| DMatrix::from_column_slice(3, 3, (self.axes * matrix).as_slice());
         let column = |v: &Vector3<f64>| DMatrix::from_column_slice(3, 1, (self.axes * v).as_slice());
-        let mut by_shared = DMatrix::zeros(3, layout.len - Layout::VEHICLE);
+        let mut by_shared = DMatrix::zeros(3, all.shared());
         put(&mut by_shared, places.misalignment, &dense(seen.by_mount));
         let mut expected = seen.predicted.into_inner();
         let c = &estimates.shared.corrections;

@@ -6,6 +6,8 @@ use hzn_nav::layout::{Layout, Place};
 use hzn_nav::strapdown::Nominal;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use super::places::{LensPlaces, Places};
+
 /// The errors that last the whole flight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shared {
@@ -15,6 +17,8 @@ pub struct Shared {
     pub mounts: Vec<Rotation<Cam, Vehicle>>,
     /// The times that are added to the clocks of the cameras, s.
     pub clocks_s: Vec<f64>,
+    /// Errors of the lenses, true minus told: the focal length as a fraction, the principal point (x, y) in px.
+    pub lenses: Vec<Vector3<f64>>,
 }
 
 /// Estimates of all unknowns. Their blocks are the knots, then the slow errors, then the shared errors.
@@ -40,15 +44,15 @@ impl Estimates {
     }
 
     /// Returns the number of unknowns of each block.
-    pub fn sizes(&self, layout: &Layout) -> Vec<usize> {
+    pub fn sizes(&self, places: &Places) -> Vec<usize> {
         let knots = self.knots.iter().map(|_| Layout::VEHICLE);
-        knots.chain(self.slow.iter().map(|_| 3)).chain([layout.len - Layout::VEHICLE]).collect()
+        knots.chain(self.slow.iter().map(|_| 3)).chain([places.shared()]).collect()
     }
 
     /// Returns the estimates moved by a step, which `part` gives for each block. Attitudes turn from the left, as in
     /// the filter, and mounts from the right.
     #[must_use]
-    pub fn moved(&self, layout: &Layout, part: impl Fn(usize) -> DVector<f64>) -> Self {
+    pub fn moved(&self, places: &Places, part: impl Fn(usize) -> DVector<f64>) -> Self {
         let mut out = self.clone();
         for (block, knot) in out.knots.iter_mut().enumerate() {
             let step = part(block);
@@ -60,14 +64,14 @@ impl Estimates {
         for (index, slow) in out.slow.iter_mut().enumerate() {
             *slow += three(&part(self.slow_block(index)), 0);
         }
-        out.shared.apply(layout, &part(self.shared_block()));
+        out.shared.apply(places, &part(self.shared_block()));
         out
     }
 }
 
 impl Shared {
-    fn apply(&mut self, layout: &Layout, step: &DVector<f64>) {
-        let c = &mut self.corrections;
+    fn apply(&mut self, places: &Places, step: &DVector<f64>) {
+        let (layout, c) = (&places.filter, &mut self.corrections);
         let blocks = [
             (layout.accel_bias, &mut c.accel_bias),
             (layout.accel_scale, &mut c.accel_scale),
@@ -97,11 +101,18 @@ impl Shared {
                 *clock_s += step[column(place)];
             }
         }
+        for (lens, places) in self.lenses.iter_mut().zip(&places.lenses) {
+            for (first, place) in places.each() {
+                let mut part = lens.rows_mut(first, place.len);
+                part += step.rows(column(place), place.len);
+            }
+        }
     }
 
     /// Returns what differs from what was known before, in the places of the block.
-    pub(super) fn since(&self, told: &[Rotation<Cam, Vehicle>], layout: &Layout) -> DVector<f64> {
-        let mut out = DVector::zeros(layout.len - Layout::VEHICLE);
+    pub(super) fn since(&self, told: &[Rotation<Cam, Vehicle>], places: &Places) -> DVector<f64> {
+        let layout = &places.filter;
+        let mut out = DVector::zeros(places.shared());
         let mut put = |place: Option<Place>, value: &[f64]| {
             if let Some(place) = place {
                 value.iter().enumerate().for_each(|(i, x)| out[column(place) + i] = *x);
@@ -122,6 +133,10 @@ impl Shared {
             put(places.misalignment, &error.xyz());
             put(places.clock, &[*clock_s]);
         }
+        for (lens, places) in self.lenses.iter().zip(&places.lenses) {
+            put(places.focal, &[lens.x]);
+            put(places.centre, &[lens.y, lens.z]);
+        }
         out
     }
 }
@@ -129,6 +144,13 @@ impl Shared {
 /// Returns the column of an error in the block of the shared errors: the filter has the state before them.
 pub(super) fn column(place: Place) -> usize {
     place.first - Layout::VEHICLE
+}
+
+/// Puts the derivative by the unknowns of a lens into their columns.
+pub(super) fn put_lens(derivative: &mut DMatrix<f64>, places: Option<&LensPlaces>, value: &DMatrix<f64>) {
+    for (first, place) in places.into_iter().flat_map(|places| places.each()) {
+        put(derivative, Some(place), &value.columns(first, place.len).into_owned());
+    }
 }
 
 /// Returns three components of a step.

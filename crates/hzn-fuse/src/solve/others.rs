@@ -43,7 +43,6 @@ pub(super) fn first(knot: &Nominal, begin: &Nominal, sigmas: [f64; 3]) -> [Linea
 }
 
 /// Returns what was known about the shared errors before.
-pub(super) fn known(since: &DVector<f64>, sigmas: &DVector<f64>, block: usize) -> Linear {
-    let error = since.component_div(sigmas);
-    Linear { error, derivatives: vec![(block, DMatrix::from_diagonal(&sigmas.map(|s| 1.0 / s)))] }
+pub(super) fn known(since: &DVector<f64>, root: &DMatrix<f64>, block: usize) -> Linear {
+    Linear { error: root * since, derivatives: vec![(block, root.clone())] }
 }

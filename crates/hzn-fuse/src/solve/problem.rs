@@ -5,28 +5,31 @@ use std::collections::HashMap;
 use hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M;
 use hzn_nav::filter::{DirectionMeasurement, chi2_limit};
 use hzn_nav::frames::{Cam, Rotation};
-use hzn_nav::layout::{Layout, Place};
-use hzn_nav::options::{Block, CameraOptions, Mode, Options};
+use hzn_nav::layout::Layout;
+use hzn_nav::options::{CameraOptions, Mode};
 use hzn_nav::strapdown::Nominal;
 use nalgebra::{DVector, Matrix3};
 
 use super::begin::{first_estimates, shared};
-use super::carried::{Carrier, errors_of_unit};
+use super::carried::Carrier;
 use super::cones::{Cone, Told};
 use super::directions::{At, CentreSeen, Direction};
 use super::estimates::{Estimates, column};
 use super::knots::Knot;
+use super::known::{Known, without_fixed};
+use super::lens::Lens;
 use super::loss::Loss;
 use super::others;
+use super::places::Places;
 use super::slow::Link;
 use super::turning::Turning;
 use crate::data::Flight;
 use crate::error::Error;
 use crate::events::{Event, Source};
-use crate::input::{Body, Seen};
+use crate::input::{Body, Recording, Seen};
 use crate::reference::limb_axis;
 use crate::results::Kind;
-use crate::settings::{Limb, Settings};
+use crate::settings::{LensSetting, Limb, Settings};
 use crate::sparse::Linear;
 use crate::track::Track;
 
@@ -74,8 +77,9 @@ pub struct Problem<'a> {
     /// Whether limbs count with their freely fitted cones instead of their axes.
     points: bool,
     cameras: Vec<CameraOptions>,
-    layout: Layout,
-    sigmas: DVector<f64>,
+    lenses: Vec<Option<Lens>>,
+    places: Places,
+    known: Known,
     begin: Nominal,
     carrier: Carrier,
     turning: Turning,
@@ -97,7 +101,10 @@ impl<'a> Problem<'a> {
         let slow: Vec<Option<f64>> =
             cameras.iter().map(|c| (c.slow_error != Mode::Off).then_some(c.slow_error_time_s)).collect();
         let known = without_fixed(&mut options, &mut cameras);
-        let layout = Layout::new(&options, &cameras);
+        let lenses = lenses(flight, settings)?;
+        let is_unknown: Vec<[bool; 2]> =
+            lenses.iter().map(|lens| lens.as_ref().map_or([false; 2], Lens::is_unknown)).collect();
+        let places = Places::new(&options, &cameras, &is_unknown);
         let has_receiver = flight.inputs.has_receiver();
         let carrier = Carrier::new(&options, flight.samples, has_receiver);
         let turning = Turning::new(flight.samples);
@@ -106,14 +113,15 @@ impl<'a> Problem<'a> {
             return Err(Error::unusable("--solve: there is no measurement after the start"));
         };
         let estimates = Estimates { knots: states, slow: Vec::new(), shared: shared(track) };
-        let sigmas = sigmas(&known, &layout);
+        let known = Known::new(&known, &lenses, &places);
         let mut problem = Self {
             flight: *flight,
             settings,
             points,
             cameras,
-            layout,
-            sigmas,
+            lenses,
+            places,
+            known,
             begin,
             carrier,
             turning,
@@ -180,11 +188,12 @@ impl<'a> Problem<'a> {
         let role = Role::Measured(at.time_s, Some(at.camera), Kind::Direction(seen.body));
         if let Some((cone, altitude_km)) = seen.cone.zip(seen.altitude_km).filter(|_| self.points) {
             let told = Told { reference, altitude_km, slow_share: seen.slow_share() };
-            let cone = Cone::new(at, &cone, told, state, white_rad, slow)?;
+            let lens = self.lenses.get(at.camera).and_then(Option::as_ref);
+            let cone = Cone::new(at, &cone, told, state, white_rad, slow, lens)?;
             self.measured.push((role, Measured::Cone(Box::new(cone))));
             return Some(seen.body);
         }
-        let measurement = DirectionMeasurement {
+        let mut measurement = DirectionMeasurement {
             camera: at.camera,
             body: 0,
             measured: seen.axis,
@@ -194,25 +203,33 @@ impl<'a> Problem<'a> {
             by_limb_height: seen.by_limb_height,
             is_limb: seen.body == Body::Limb,
         };
-        let direction = Direction::new(at, &measurement, &state.position_m, white_rad, slow).ok()?;
+        let lens = self.lenses.get(at.camera).and_then(Option::as_ref);
+        let lens = lens.and_then(|lens| Some((lens, lens.by_lens_of(seen)?)));
+        if let Some((lens, by)) = &lens {
+            for covariance in [Some(&mut measurement.covariance_rad2), measurement.common_rad2.as_mut()] {
+                covariance.into_iter().for_each(|c| *c = lens.without(c.as_inner(), by).into());
+            }
+        }
+        let mut direction = Direction::new(at, &measurement, &state.position_m, white_rad, slow).ok()?;
+        direction.by_lens = lens.map(|(_, by)| by);
         self.measured.push((role, Measured::Direction(direction)));
         Some(seen.body)
     }
 
     /// Returns the places of the shared errors, after those of a state.
-    pub fn layout(&self) -> &Layout {
-        &self.layout
+    pub fn places(&self) -> &Places {
+        &self.places
     }
 
     /// Returns what was known of the shared errors before: 1-sigma of each.
     pub fn known(&self) -> &DVector<f64> {
-        &self.sigmas
+        &self.known.sigmas
     }
 
     /// Returns the share of the limb height's prior sigma in the variance of the limbs' directions; `None` if the limb
     /// height is known, or if there are no limbs.
     pub(super) fn limb_share_of_directions(&self) -> Option<f64> {
-        let sigma_km = self.sigmas.get(column(self.layout.limb_height?))?;
+        let sigma_km = self.known.sigmas.get(column(self.places.filter.limb_height?))?;
         let seen = self.flight.inputs.recordings.iter().flat_map(|r| &r.seen).filter(|s| s.body == Body::Limb);
         let (by_limb, rest) = seen.fold((0.0, 0.0), |(by_limb, rest), s| {
             let height = s.by_limb_height.norm_squared() * sigma_km * sigma_km;
@@ -240,7 +257,7 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// A state is not finite.
     pub fn errors(&self, estimates: &Estimates, loss: Loss) -> Result<Vec<Weighed>, Error> {
-        let shared = self.layout.len - Layout::VEHICLE;
+        let shared = self.places.shared();
         let model = |linear: Linear| {
             let cost = linear.error.norm_squared();
             Weighed { role: Role::Model, linear, weight: 1.0, cost }
@@ -249,8 +266,8 @@ impl<'a> Problem<'a> {
         if let Some(knot) = estimates.knots.first() {
             all.extend(others::first(knot, &self.begin, FIRST).map(model));
         }
-        let since = estimates.shared.since(&self.told(), &self.layout);
-        all.push(model(others::known(&since, &self.sigmas, estimates.shared_block())));
+        let since = estimates.shared.since(&self.told(), &self.places);
+        all.push(model(others::known(&since, &self.known.root, estimates.shared_block())));
         for (i, pair) in estimates.knots.windows(2).enumerate() {
             let [from, to] = pair else { continue };
             let blocks = [i, i + 1, estimates.shared_block()];
@@ -267,9 +284,9 @@ impl<'a> Problem<'a> {
 
     fn measured_error(&self, estimates: &Estimates, role: Role, measured: &Measured) -> Option<Linear> {
         match measured {
-            Measured::Direction(direction) => direction.error(estimates, &self.layout, &self.turning),
-            Measured::Cone(cone) => cone.error(estimates, &self.layout, &self.turning),
-            Measured::Centre(centre) => centre.error(estimates, &self.layout, &self.turning),
+            Measured::Direction(direction) => direction.error(estimates, &self.places, &self.turning),
+            Measured::Cone(cone) => cone.error(estimates, &self.places, &self.turning),
+            Measured::Centre(centre) => centre.error(estimates, &self.places, &self.turning),
             Measured::Fix { knot, index } => {
                 let (fix, state) = (self.flight.inputs.gnss.get(*index)?, estimates.knots.get(*knot)?);
                 let [position, velocity] = self.settings.fix_sigmas(fix);
@@ -299,44 +316,22 @@ fn weighed(role: Role, linear: Linear, loss: Loss, gate_probability: f64) -> Wei
     Weighed { role, linear, weight, cost }
 }
 
-/// Leaves out the errors that are known exactly; returns what is known of the others.
-fn without_fixed(options: &mut Options, cameras: &mut [CameraOptions]) -> (Options, Vec<CameraOptions>) {
-    let fixed = |block: &mut Block| {
-        if !(block.sigma > 0.0) {
-            *block = Block::OFF;
+/// Returns the unknown lenses, in the order of the cameras.
+fn lenses(flight: &Flight<'_>, settings: &Settings) -> Result<Vec<Option<Lens>>, Error> {
+    let lens = |recording: &Recording| {
+        let (name, own) = (&recording.name, settings.camera(&recording.name));
+        if let Some(config) = &recording.camera {
+            return Ok(Lens::new(config, own));
+        }
+        let keys = [("focal_percent", own.focal_percent), ("centre_px", own.centre_px)];
+        let is_told = |setting: &LensSetting| setting.sigma_or(0.0) > 0.0 && !recording.is_table;
+        match keys.iter().find(|(_, setting)| is_told(setting)) {
+            Some((key, _)) => Err(Error::unusable(format!(
+                "{name}: {key} has a sigma in fuse.toml, but the lens is not known; give the recording in MCAP, which \
+                 has its sensor.toml, or --mount {name}=sensor.toml, or leave the key out"
+            ))),
+            None => Ok(None),
         }
     };
-    errors_of_unit(options).into_iter().for_each(fixed);
-    [&mut options.limb_height, &mut options.limb_latitude].into_iter().for_each(fixed);
-    for camera in cameras.iter_mut() {
-        fixed(&mut camera.misalignment);
-        fixed(&mut camera.clock);
-        // The slow errors are unknowns of their own.
-        camera.bodies = 0;
-    }
-    (*options, cameras.to_vec())
-}
-
-/// Returns the sigmas of the shared errors.
-fn sigmas((options, cameras): &(Options, Vec<CameraOptions>), layout: &Layout) -> DVector<f64> {
-    let mut out = DVector::zeros(layout.len - Layout::VEHICLE);
-    let mut fill = |place: Option<Place>, block: &Block| {
-        if let Some(place) = place {
-            out.rows_mut(column(place), place.len).fill(block.sigma);
-        }
-    };
-    let imu = &options.imu;
-    fill(layout.accel_bias, &imu.accel_bias);
-    fill(layout.accel_scale, &imu.accel_scale);
-    fill(layout.accel_misalignment, &imu.accel_misalignment);
-    fill(layout.gyro_bias, &imu.gyro_bias);
-    fill(layout.gyro_scale, &imu.gyro_scale);
-    fill(layout.gyro_misalignment, &imu.gyro_misalignment);
-    fill(layout.limb_height, &options.limb_height);
-    fill(layout.limb_latitude, &options.limb_latitude);
-    for (places, camera) in layout.cameras.iter().zip(cameras) {
-        fill(places.misalignment, &camera.misalignment);
-        fill(places.clock, &camera.clock);
-    }
-    out
+    flight.inputs.recordings.iter().map(lens).collect()
 }

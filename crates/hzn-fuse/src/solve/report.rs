@@ -22,7 +22,7 @@ pub(super) fn report(
     let shared_block = estimates.shared_block();
     let shared = marginals.block(shared_block, shared_block).ok_or_else(missing)?;
     let mut epochs = Vec::with_capacity(estimates.knots.len());
-    let limb = LimbShare::new(problem.layout(), &shared);
+    let limb = LimbShare::new(&problem.places().filter, &shared);
     let (mut by_limb, mut total) = (0.0, 0.0);
     for knot in 0..estimates.knots.len() {
         let own = marginals.block(knot, knot).ok_or_else(missing)?;
@@ -106,7 +106,7 @@ impl Known<'_> {
 
 fn epoch(problem: &Problem<'_>, estimates: &Estimates, knot: usize, known: &Known<'_>) -> Option<Epoch> {
     let state = *estimates.knots.get(knot)?;
-    let (layout, shared) = (problem.layout(), &estimates.shared);
+    let (layout, shared) = (&problem.places().filter, &estimates.shared);
     let to_vehicle: Rotation<Fixed, Vehicle> = state.attitude.inverse();
     let told = problem.told();
     let camera = |which: usize| {
@@ -144,8 +144,9 @@ fn epoch(problem: &Problem<'_>, estimates: &Estimates, knot: usize, known: &Know
 
 /// Returns what was known of the shared errors before and afterwards.
 fn determined(problem: &Problem<'_>, estimates: &Estimates, shared: &DMatrix<f64>) -> Vec<Determined> {
-    let (layout, known) = (problem.layout(), problem.known());
-    let since: DVector<f64> = estimates.shared.since(&problem.told(), layout);
+    let (places, known) = (problem.places(), problem.known());
+    let layout = &places.filter;
+    let since: DVector<f64> = estimates.shared.since(&problem.told(), places);
     let mut out = Vec::new();
     let mut add = |name: String, unit: &'static str, factor: f64, place: Option<Place>| {
         let Some(place) = place else { return };
@@ -172,6 +173,10 @@ fn determined(problem: &Problem<'_>, estimates: &Estimates, shared: &DMatrix<f64
     for (name, places) in problem.cameras().iter().zip(&layout.cameras) {
         add(format!("mount of {name}"), "deg", 1f64.to_degrees(), places.misalignment);
         add(format!("clock of {name}"), "s", 1.0, places.clock);
+    }
+    for (name, places) in problem.cameras().iter().zip(&places.lenses) {
+        add(format!("focal length of {name}"), "%", 100.0, places.focal);
+        add(format!("principal point of {name}"), "px", 1.0, places.centre);
     }
     out
 }

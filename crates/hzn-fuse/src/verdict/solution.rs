@@ -8,7 +8,7 @@ use hzn_nav::options::{Block, CameraOptions, Mode, Options};
 
 use super::receiver::median;
 use crate::finding::{Cause, Finding, Level, Source};
-use crate::results::{Epoch, Fused, Innovation, Kind, Solved};
+use crate::results::{Determined, Epoch, Fused, Innovation, Kind, Solved};
 
 /// Sigmas of an estimate above which it contradicts what was known before.
 const FAR: f64 = 4.0;
@@ -29,6 +29,7 @@ pub(super) fn test(fused: &Fused, cameras: &[CameraOptions], options: &Options) 
     }
     if let (Some(solved), Some(last)) = (&fused.solved, fused.smoothed.last()) {
         estimates("the solve", fused, last, cameras, options, &mut all);
+        all.extend(fused.cameras.iter().filter_map(|name| lens(solved, name)));
         all.extend(solved.sources.iter().filter_map(|(source, count)| lowered(fused, solved, *source, *count)));
     }
     for ((camera, kind), innovations) in &by_source(fused) {
@@ -91,6 +92,24 @@ fn estimates(
         );
         all.push(Finding { level: Level::Doubtful, cause: Cause::CameraClock, source: Source::Cameras, what });
     }
+}
+
+/// Compares the lens of a camera with what was known before.
+fn lens(solved: &Solved, name: &str) -> Option<Finding> {
+    let own = [format!("focal length of {name}"), format!("principal point of {name}")];
+    let estimates = solved.determined.iter().filter(|one| own.contains(&one.name));
+    let sigmas = |one: &Determined| {
+        one.estimate.iter().zip(&one.before).map(|(value, sigma)| (value / sigma).abs()).fold(0.0, f64::max)
+    };
+    let (one, far) = estimates.map(|one| (one, sigmas(one))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (far > FAR).then(|| {
+        let what = format!(
+            "the solve estimates the {} {far:.1} sigma from what was known before: is its calibration that of this \
+             flight?",
+            one.name
+        );
+        Finding { level: Level::Contradicts, cause: Cause::Lens, source: Source::Camera(name.to_owned()), what }
+    })
 }
 
 type Sources<'a> = BTreeMap<(Option<usize>, Kind), Vec<&'a Innovation>>;

@@ -5,6 +5,8 @@ mod common;
 mod common_part;
 mod directions;
 mod flight;
+mod infrared;
+mod lens;
 mod oem;
 mod orbit;
 mod points;

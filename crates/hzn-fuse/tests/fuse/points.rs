@@ -32,7 +32,7 @@ const SLOW_S: f64 = 20.0;
 const WHITE_RAD: f64 = 2e-4;
 
 /// Cones with slow errors, and the axes that a sensor makes of them.
-struct Cones {
+pub(crate) struct Cones {
     draws: Draws,
     /// The errors of a camera over their sigmas, in its axes.
     last: Vec<(Moment, Vector3<f64>)>,
@@ -60,7 +60,7 @@ fn covariance(axis: &Vector<Cam>, sin: f64) -> Matrix3<f64> {
 }
 
 impl Cones {
-    fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         Self { draws: Draws(seed), last: Vec::new(), drawn: None }
     }
 
