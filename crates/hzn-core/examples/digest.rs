@@ -8,7 +8,7 @@ use common::{KINDS, garbage};
 use hzn_core::camera::{self, Model};
 use hzn_core::image::{Grey, Layout};
 use hzn_core::status::Status;
-use hzn_core::{Config, FlightHorizon, HostHorizon, Prior};
+use hzn_core::{Config, FlightHorizon, HostHorizon, Prior, Step, Tracker};
 
 const WIDTH: u32 = 96;
 const HEIGHT: u32 = 64;
@@ -47,12 +47,14 @@ fn limb(random: &mut Random) -> Vec<u8> {
 fn main() {
     let count: u64 = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(2000);
     let mut random = Random(11);
-    let (mut text, mut answers, mut sum) = (String::new(), 0, 0u32);
+    let step = Step { after_s: Some(0.1), rate_rad_s: None, attitude: None };
+    let (mut text, mut answers, mut tracked, mut sum) = (String::new(), 0, 0, 0u32);
     for model in MODELS {
         let mut config = Config::new(camera::Config::ideal(model, WIDTH as u16, HEIGHT as u16, 60.0));
         config.body.altitude_km = Some(300.0);
         config.edge_points.min_points = 8;
         config.gates.min_inliers = 8;
+        config.track.full_every = 1000;
         let mut host = HostHorizon::boxed(&config).expect("the configuration is valid");
         let mut flight = FlightHorizon::boxed(&config).expect("the configuration is valid");
         let (double, single) = (host.expect(&Prior::default()), flight.expect(&Prior::default()));
@@ -63,13 +65,21 @@ fn main() {
             let picture = Grey::try_new(&bytes, Layout::packed(WIDTH, HEIGHT, 1, 8)).expect("the picture is whole");
             let (a, b) = (host.process(&picture, &double), flight.process(&picture, &single));
             answers += u32::from(a.status == Status::Ok) + u32::from(b.status == Status::Ok);
+            // The picture comes a second time, as if nothing had moved.
+            let mut tracker = Tracker::default();
+            let _ = flight.track(&mut tracker, &picture, (&single, &step));
+            let c = flight.track(&mut tracker, &picture, (&single, &step));
+            tracked += u32::from(c.is_tracked());
             // The texts have every bit of a number; they are added to one checksum.
             text.clear();
-            text.push_str(&format!("{sum} {a:?} {b:?}"));
+            text.push_str(&format!("{sum} {a:?} {b:?} {c:?}"));
             sum = crc32(text.as_bytes());
         }
     }
-    println!("{count} pictures, {} lenses, two precisions: {answers} answers, checksum {sum:08x}", MODELS.len());
+    let lenses = MODELS.len();
+    println!(
+        "{count} pictures, {lenses} lenses, two precisions: {answers} answers, {tracked} tracked, checksum {sum:08x}"
+    );
 }
 
 /// Returns the CRC-32 of bytes (ISO-HDLC).
