@@ -9,6 +9,8 @@ use std::path::Path;
 
 /// Largest box with the index of a file. Ten hours of video need about 50 MB.
 const MAX_INDEX_BYTES: u64 = 256 << 20;
+/// Most boxes beside the index. A camera writes a few; a file that was made to take time has millions.
+const MAX_BOXES: usize = 100_000;
 /// Largest payload. A second of measurements has about 20 kB.
 const MAX_PAYLOAD_BYTES: u64 = 4 << 20;
 /// Most payloads: eleven days, with one a second.
@@ -51,7 +53,10 @@ pub(super) fn read(path: &Path) -> io::Result<Option<Metadata>> {
 fn read_index(file: &mut File) -> io::Result<Option<Vec<u8>>> {
     let end = file.metadata()?.len();
     let mut at = 0u64;
-    while at < end {
+    for _ in 0..MAX_BOXES {
+        if at >= end {
+            break;
+        }
         file.seek(SeekFrom::Start(at))?;
         let mut head = Vec::new();
         file.take(16).read_to_end(&mut head)?;
