@@ -74,10 +74,8 @@ fn pictures_of_the_sun() {
     assert!(!ran.err.contains("altitude"), "{}", ran.err);
     place.run(&[&init[..], &["--altitude", "400", "--force"]].concat()).expect(2).says("leave it out");
     place.run(&["run", "sun", "-o", "sun.csv"]).expect(0);
-    let [fx, ..] = ["fx_px = "].map(|key| {
-        let text = place.read("sun/sensor.toml");
-        text.split_once(key).unwrap().1.lines().next().unwrap().parse::<f64>().unwrap()
-    });
+    let text = place.read("sun/sensor.toml");
+    let fx: f64 = text.split_once("fx_px = ").unwrap().1.lines().next().unwrap().parse().unwrap();
     for (row, [cx, cy]) in place.rows("sun.csv").iter().zip(centres) {
         assert_eq!(cell(row, "status"), "ok", "{row:?}");
         let [x, y, z] = ["axis_x", "axis_y", "axis_z"].map(|name| cell(row, name).parse::<f64>().unwrap());

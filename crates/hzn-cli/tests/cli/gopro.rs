@@ -67,9 +67,9 @@ fn payload(second: u32, order: &str, has_fix: bool, rate: [f64; 3]) -> Vec<u8> {
         let mut letters = order.chars().map(one);
         std::array::from_fn::<f64, 3, _>(|_| letters.next().unwrap())
     };
-    let rates = vec![stored(rate); 200];
+    let rates = [stored(rate); 200];
     // The camera is upright and at rest: its accelerometer shows 1 g upwards, against y of hzn.
-    let accelerations = vec![stored([0.0, -9.81, 0.0]); 100];
+    let accelerations = [stored([0.0, -9.81, 0.0]); 100];
     let text = |key: &str, text: &str| entry(key, b'c', 1, text.as_bytes());
     nested(
         "DEVC",
