@@ -17,7 +17,13 @@ const EXAMPLE: [&str; 6] = ["--package", "hzn-core", "--features", "_programs", 
 /// Runs the example `digest` of hzn-core over `pictures` on every processor.
 pub(crate) fn compare(pictures: u64) -> Outcome {
     let debian = ["rustc-web", "cargo-web", "rust-web-src"];
-    let emulator = ["qemu-user", "gcc-aarch64-linux-gnu", "gcc-powerpc64-linux-gnu", "libc6-dev-ppc64-cross"];
+    let emulator = [
+        "qemu-user",
+        "gcc-aarch64-linux-gnu",
+        "libc6-dev-arm64-cross",
+        "gcc-powerpc64-linux-gnu",
+        "libc6-dev-ppc64-cross",
+    ];
     apt_install(&[&debian[..], &emulator[..]].concat())?;
     let pictures = pictures.to_string();
     let mut here = cargo(&["run", "--release", "--quiet"]);

@@ -54,13 +54,19 @@ pub(super) struct Args {
     force: bool,
 }
 
+impl Args {
+    fn wants_only_pictures(&self) -> bool {
+        self.images.is_some() && self.output.is_none() && self.overlay.is_none()
+    }
+}
+
 pub(super) fn run(args: &Args) -> Outcome {
     let tables = [(Instrument::Imu, &args.imu), (Instrument::Gnss, &args.gnss)];
     let tables: Vec<(Instrument, &Path)> =
         tables.into_iter().filter_map(|(which, path)| Some((which, path.as_deref()?))).collect();
     if tables.is_empty() {
         TableFormat::tell_unused(args.format, args.output.iter());
-        return match export_pictures::open(&args.file, &args.topic)? {
+        return match export_pictures::open(&args.file, &args.topic, args.wants_only_pictures())? {
             Some(source) => export_pictures_of_others(args, source),
             None => export_rows(args),
         };
@@ -77,9 +83,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 fn export_pictures_of_others(args: &Args, mut source: Box<dyn Source>) -> Outcome {
     let name = args.file.display();
     match &args.images {
-        Some(folder) if args.output.is_none() && args.overlay.is_none() => {
-            export_pictures::run(source.as_mut(), folder, args.force)
-        }
+        Some(folder) if args.wants_only_pictures() => export_pictures::run(source.as_mut(), folder, args.force),
         _ => Err(usage(format!(
             "{name}: has pictures and no rows of hzn: --images DIR writes the pictures, and \
              `hzn run {name} -o out.csv` makes rows"

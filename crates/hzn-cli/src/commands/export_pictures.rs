@@ -9,8 +9,10 @@ use hzn_run::{disk, explain, overlay};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::tell;
 
-/// Opens an input that has pictures and no rows of hzn; `None` for another one.
-pub(super) fn open(file: &Path, topics: &[String]) -> Result<Option<Box<dyn Source>>, Stop> {
+/// Opens an input that has pictures and no rows of hzn; `None` for another one. A recording of hzn whose rows were lost
+/// looks like one of another program, so that a recording is opened only if nothing but its pictures is asked for: the
+/// reader of rows tells what was lost.
+pub(super) fn open(file: &Path, topics: &[String], only_pictures: bool) -> Result<Option<Box<dyn Source>>, Stop> {
     if let [_, second, ..] = topics {
         return Err(usage(format!("--topic {second}: the pictures of one topic are written at a time")));
     }
@@ -19,7 +21,7 @@ pub(super) fn open(file: &Path, topics: &[String]) -> Result<Option<Box<dyn Sour
         return Ok(Some(open()?));
     }
     // What cannot be opened is told by the reader of rows.
-    let is_recording = file.is_file() && ending(file) == "mcap";
+    let is_recording = only_pictures && file.is_file() && ending(file) == "mcap";
     Ok((is_recording && !has_rows(file)).then(|| open().ok()).flatten())
 }
 

@@ -37,6 +37,7 @@ const CASES: &[Case] = &[
     ("in/0000.png", &["explain", "in", "--overlay", "in/0000.png", "--force"]),
     ("in/0001.png", &["explain", "in", "--overlay", "in/0001.png"]),
     ("f.csv", &["explain", "in", "--frames", "f.csv", "--overlay", "f-link.png", "--force"]),
+    ("in/sensor.toml", &["prepare", "in/sensor.toml", "-o", "in/sensor.toml", "--force"]),
     ("a.csv", &["export", "a.csv", "-o", "a.csv", "--force"]),
     ("new.csv.part", &["export", "new.csv.part", "-o", "new.csv", "--force"]),
     ("a.mcap", &["export", "a.mcap", "--images", "links", "--force"]),

@@ -70,6 +70,7 @@ const CASES: &[&[&str]] = &[
     &["completions", "{E}"],
     &["man", "{E}"],
     &["migrate", "{E}.missing.toml"],
+    &["prepare", "{E}.missing.toml"],
     &["key", "{E}"],
     &["key", "no{E}/k.key", "--spacecraft", "1"],
     &["run", "rig/rig.toml"],
