@@ -167,7 +167,7 @@ const CASES: &[Case] = &[
 
 /// The commands that write no file, or read none that the user names; and `migrate`, whose task is to rewrite its
 /// input.
-const WITHOUT: &[&str] = &["info", "view", "completions", "demo", "help", "migrate", "man", "key"];
+const WITHOUT: &[&str] = &["info", "view", "completions", "demo", "help", "migrate", "man", "key", "schema"];
 
 /// Returns a folder with an input of each kind, and links to them.
 fn place() -> Place {

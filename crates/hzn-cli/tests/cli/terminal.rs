@@ -71,6 +71,7 @@ const CASES: &[&[&str]] = &[
     &["man", "{E}"],
     &["migrate", "{E}.missing.toml"],
     &["prepare", "{E}.missing.toml"],
+    &["schema", "{E}"],
     &["key", "{E}"],
     &["key", "no{E}/k.key", "--spacecraft", "1"],
     &["run", "rig/rig.toml"],
