@@ -37,8 +37,9 @@ On the Cortex-M4F, double-precision arithmetic in software takes about 9 KB more
 `expect`: `expect` calculates the cone of an altitude or a position in double precision, once per picture. No other code
 that runs per picture uses it (`cargo xtask test` checks this).
 
-The tables *in a sequence* are with `track.full_every`. The rows of the flight image count from the picture to its answer,
-with the search for stuck pixels and the comparison of memory; those of the sensor alone count the call `Sensor::track`.
+The tables *in a sequence* are with `track.full_every`. The rows of the flight image count from the picture to its
+answer, with the search for stuck pixels and the comparison of memory; those of the sensor alone count the call
+`Sensor::track`.
 ";
 
 /// Returns the whole report.

@@ -13,9 +13,9 @@ use crate::tell;
 
 /// Check a sensor.toml and write the sensor as bytes that a flight computer reads
 ///
-/// The bytes have the configuration with the series of the lens and the region of the picture. The flight computer reads
-/// them with `Sensor::from_prepared` or `FlightHorizon::load`, and then needs neither the checks nor the functions that
-/// make a lens. Its answers are the same to the last bit. Another version of hzn refuses the bytes.
+/// The bytes have the configuration with the series of the lens and the region of the picture. The flight computer
+/// reads them with `Sensor::from_prepared` or `FlightHorizon::load`, and then needs neither the checks nor the
+/// functions that make a lens. Its answers are the same to the last bit. Another version of hzn refuses the bytes.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The sensor.toml

@@ -6,6 +6,7 @@ pub mod keys;
 pub(crate) mod linalg;
 pub(crate) mod median;
 pub(crate) mod packed;
+pub(crate) mod parts;
 pub mod real;
 pub(crate) mod rng;
 pub(crate) mod sort;

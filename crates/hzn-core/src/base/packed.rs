@@ -179,22 +179,3 @@ pub(crate) fn check_list<P: Packed, const N: usize>(from: &mut Unpacker<'_>) {
         let _ = P::unpack(from);
     }
 }
-
-/// Implements [`Packed`] for a structure: its parts in order, and after a semicolon those that are not written, with
-/// their values.
-macro_rules! packed {
-    ($name:ident $(<$t:ident>)? { $($field:ident),+ $(; $($fixed:ident = $value:expr),+)? }) => {
-        impl $(<$t: $crate::base::real::Real>)? $crate::base::packed::Packed for $name $(<$t>)? {
-            fn pack(&self, to: &mut $crate::base::packed::Packer<'_>) {
-                $($crate::base::packed::Packed::pack(&self.$field, to);)+
-            }
-            // Not inlined: each part is then made where it stays.
-            #[inline(never)]
-            fn unpack(from: &mut $crate::base::packed::Unpacker<'_>) -> Self {
-                Self { $($field: $crate::base::packed::Packed::unpack(from),)+ $($($fixed: $value),+)? }
-            }
-        }
-    };
-}
-
-pub(crate) use packed;

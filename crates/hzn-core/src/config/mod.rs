@@ -8,7 +8,7 @@ pub use numbers::SECTIONS;
 
 use crate::base::error::{ConfigError, Limit, between, require};
 use crate::base::keys::{Section, choices, section};
-use crate::base::packed::packed;
+use crate::base::parts::packed;
 use crate::geometry::camera;
 use crate::image::Channel;
 use crate::image::region;

@@ -119,8 +119,8 @@ impl<T: Real, const POINTS: usize, const BLOCKS: usize, const WORDS: usize> Hori
         self.levels = [None; MAX_BODIES];
         Ok(())
     }
-    /// Makes this the sensor that [`Sensor::prepare`] wrote, from the next picture on. If the bytes are refused, nothing
-    /// changes.
+    /// Makes this the sensor that [`Sensor::prepare`] wrote, from the next picture on. If the bytes are refused,
+    /// nothing changes.
     ///
     /// # Errors
     /// The bytes are not those of a sensor for this program, or they were changed.

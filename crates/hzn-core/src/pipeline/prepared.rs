@@ -11,12 +11,13 @@
 //! | 8 | 4 | the keys that the program knows, as a number of their names, types and words |
 //! | 12 | 4 | the bytes of the body |
 //! | 16 | 4 | CRC-32 (ISO-HDLC, as in zip) of the bytes before, and of the body |
-//! | 20 | | camera with the series of its lens, region, rotation of the mount, configuration; then its polygons and bodies |
+//! | 20 | | camera with the series of its lens, region, rotation of the mount, configuration, its polygons and bodies |
 
 use core::fmt;
 
 use super::sensor::Sensor;
-use crate::base::packed::{self, Packed, Packer, Unpacker, packed};
+use crate::base::packed::{self, Packed, Packer, Unpacker};
+use crate::base::parts::packed;
 use crate::base::real::Real;
 use crate::config::{Config, SECTIONS};
 use crate::geometry::camera::Camera;

@@ -2,9 +2,10 @@
 //! flash and RAM of this image are the resources that the `hzn` chain needs on a flight computer, without the bytes of
 //! the sensor.
 //!
-//! `sensor.bin` is the sensor that `hzn prepare` writes, and zeros behind it, as a page of flash has. `picture.bin` is the picture, 1920×1080 bytes. `answer.bin` is the result in little-endian words: status, axis (3),
-//! covariance (xx, xy, xz, yy, yz, zz), and the high-water mark of the stack in bytes. Axis and covariance are
-//! single-precision numbers; the other two words are integers.
+//! `sensor.bin` is the sensor that `hzn prepare` writes, and zeros behind it, as a page of flash has. `picture.bin` is
+//! the picture, 1920×1080 bytes. `answer.bin` is the result in little-endian words: status, axis (3), covariance (xx,
+//! xy, xz, yy, yz, zz), and the high-water mark of the stack in bytes. Axis and covariance are single-precision
+//! numbers; the other two words are integers.
 
 #![no_std]
 #![no_main]

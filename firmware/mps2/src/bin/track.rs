@@ -1,6 +1,6 @@
 //! Does the same as `measure` with pictures that are a sequence: the sensor of the first case looks for the limb where
-//! the picture before puts it. [`hzn_mps2::cases`] describes the files. A tenth of a second is between two pictures. The
-//! three calls are making the sensor, `expect`, and the whole picture; the ticks of the stages are 0.
+//! the picture before puts it. [`hzn_mps2::cases`] describes the files. A tenth of a second is between two pictures.
+//! The three calls are making the sensor, `expect`, and the whole picture; the ticks of the stages are 0.
 
 #![no_std]
 #![no_main]

@@ -4,7 +4,7 @@ use super::config::Config;
 use super::ray::radial_ray;
 use crate::base::error::{ConfigError, Limit};
 use crate::base::linalg::V3;
-use crate::base::packed::packed;
+use crate::base::parts::packed;
 use crate::base::real::Real;
 
 #[derive(Debug, Clone, PartialEq)]

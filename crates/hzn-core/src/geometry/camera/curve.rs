@@ -4,7 +4,8 @@
 //! series, the check that the lens is monotone, rays, projection) is the same for all of them.
 
 use super::{double_sphere, eucm};
-use crate::base::packed::{Packed, Packer, Unpacker, packed};
+use crate::base::packed::{Packed, Packer, Unpacker};
+use crate::base::parts::packed;
 use crate::base::real::Real;
 use crate::geometry::camera::Config;
 use crate::geometry::camera::Model;

@@ -2,7 +2,8 @@
 
 use super::Camera;
 use super::intrinsic::{Covariance, Intrinsic};
-use crate::base::packed::{Packed, Packer, Unpacker, packed};
+use crate::base::packed::{Packed, Packer, Unpacker};
+use crate::base::parts::packed;
 
 packed!(Covariance { order, rows });
 // A sensor's camera does not turn, and its rays are not scaled: both belong to one picture.

@@ -10,7 +10,8 @@ use super::curve::Curve;
 use super::ray::radial_ray;
 use crate::base::error::{ConfigError, Limit, require};
 use crate::base::linalg::V3;
-use crate::base::packed::{Packed, Packer, Unpacker, packed};
+use crate::base::packed::{Packed, Packer, Unpacker};
+use crate::base::parts::packed;
 use crate::base::real::Real;
 use crate::geometry::block::LANES;
 

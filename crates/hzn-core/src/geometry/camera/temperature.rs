@@ -6,7 +6,7 @@
 use super::intrinsic::INTRINSICS;
 use crate::base::error::{ConfigError, between};
 use crate::base::keys::{Form, Value};
-use crate::base::packed::packed;
+use crate::base::parts::packed;
 use crate::base::real::Real;
 
 /// Largest change of the focal lengths, and of the principal point in focal lengths.

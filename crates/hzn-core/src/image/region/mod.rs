@@ -10,7 +10,7 @@ pub(crate) use ring::Run;
 
 use crate::base::error::{ConfigError, Limit, between, require};
 use crate::base::keys::section;
-use crate::base::packed::packed;
+use crate::base::parts::packed;
 use crate::base::real::Real;
 use crate::geometry::camera::{self, Camera};
 use crate::geometry::crop::Crop;

@@ -1,6 +1,6 @@
 //! A masked polygon.
 
-use crate::base::packed::packed;
+use crate::base::parts::packed;
 use crate::base::real::Real;
 
 /// Maximum number of corners of one polygon.

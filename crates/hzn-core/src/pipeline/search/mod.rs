@@ -74,8 +74,8 @@ struct Best<T> {
 }
 
 impl<'a, T: Real, O: Observer<T>> Search<'a, T, O> {
-    /// Begins a search. `camera` is the camera of the sensor or [`Sensor::camera_for`], and `work` is the work budget of
-    /// the look.
+    /// Begins a search. `camera` is the camera of the sensor or [`Sensor::camera_for`], and `work` is the work budget
+    /// of the look.
     // Inlined and returned alone: the search is then made where it stays.
     #[inline(always)]
     pub(super) fn new<P>(
