@@ -26,7 +26,7 @@ const STAGES: [&str; 11] = [
 /// Functions that convert values of the configuration to single precision, once per picture or per candidate. Each has
 /// the number of places that may do so, the larger one of the images `chain` and `measure`.
 const ALLOWED_CONVERSIONS: [(&str, usize); 19] = [
-    ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::candidate::{{closure}}", 35),
+    ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::candidate", 35),
     ("hzn_core::pipeline::search::edge::<impl hzn_core::pipeline::search::Search<T,O>>::judge_edge", 40),
     ("hzn_core::stages::consensus::inliers::Threshold<T>::new", 3),
     ("hzn_core::stages::consensus::find", 2),
@@ -63,8 +63,10 @@ pub(crate) fn check(image: &Path) -> Outcome {
     }
     for (function, &count) in &calls {
         let staged = STAGES.iter().any(|s| function.contains(&format!("hzn_core::{s}")));
+        // Checks of a configuration, and of the bytes of a prepared sensor, once before the first picture.
         let checks = function.contains("::check")
             || function.contains("keys::Section>")
+            || function.contains("base::packed::Packed>")
             || function.contains("Camera<T>::try_new");
         let allowed = allowed_conversions(function);
         if staged && !checks && count > allowed {
