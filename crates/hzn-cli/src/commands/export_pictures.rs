@@ -9,9 +9,9 @@ use hzn_run::{disk, explain, overlay};
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::tell;
 
-/// Opens an input that has pictures and no rows of hzn; `None` for another one. A recording of hzn whose rows were lost
-/// looks like one of another program, so that a recording is opened only if nothing but its pictures is asked for: the
-/// reader of rows tells what was lost.
+/// Opens an input that has pictures and no rows of hzn; `None` for another one. A recording is opened only if
+/// `only_pictures` says that nothing else is wanted.
+// A recording of hzn that lost its rows looks like one of another program. The reader of rows says what was lost.
 pub(super) fn open(file: &Path, topics: &[String], only_pictures: bool) -> Result<Option<Box<dyn Source>>, Stop> {
     if let [_, second, ..] = topics {
         return Err(usage(format!("--topic {second}: the pictures of one topic are written at a time")));

@@ -1,4 +1,4 @@
-//! What was known of the errors that last the whole flight.
+//! The priors of the errors that last the whole flight.
 
 use hzn_nav::layout::Place;
 use hzn_nav::options::{Block, CameraOptions, Options};
@@ -9,7 +9,7 @@ use super::estimates::column;
 use super::lens::Lens;
 use super::places::{LensPlaces, Places};
 
-/// Leaves out the errors that are known exactly; returns what is known of the others.
+/// Leaves out the errors that are known exactly, and returns the priors of the others.
 pub(super) fn without_fixed(options: &mut Options, cameras: &mut [CameraOptions]) -> (Options, Vec<CameraOptions>) {
     let fixed = |block: &mut Block| {
         if !(block.sigma > 0.0) {
@@ -27,7 +27,7 @@ pub(super) fn without_fixed(options: &mut Options, cameras: &mut [CameraOptions]
     (*options, cameras.to_vec())
 }
 
-/// What was known of the errors that last the whole flight.
+/// The priors of the errors that last the whole flight.
 #[derive(Debug, Clone)]
 pub(super) struct Known {
     /// 1-sigma of each.

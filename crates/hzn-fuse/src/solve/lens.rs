@@ -44,7 +44,7 @@ const DISC_RAD: f64 = 0.00465;
 /// fraction, and the principal point (x, y), px.
 pub type ByLens = SMatrix<f64, 4, UNKNOWNS>;
 
-/// The lens of a camera, with what is known of it.
+/// The lens of a camera, with the priors of its errors.
 #[derive(Debug, Clone)]
 pub struct Lens {
     camera: Camera<f64>,
