@@ -332,6 +332,40 @@ fn an_edge_without_air_is_an_unlikely_limb() {
     assert!(moon.solution.is_some_and(|s| s.p_limb.is_none()));
 }
 
+/// Draws a circle of the picture and processes it. Returns the report and the true axis.
+fn circle(config: &Config, centre: [f64; 2], radius_px: f64) -> (Report<f64>, [f64; 3]) {
+    let camera = &config.camera;
+    let width = u32::from(camera.width);
+    let pixel = |i: u32| {
+        let off = (f64::from(i % width) - centre[0]).hypot(f64::from(i / width) - centre[1]);
+        (128.0 * (radius_px + 0.5 - off).clamp(0.0, 1.0)) as u8
+    };
+    let data: Vec<u8> = (0..width * u32::from(camera.height)).map(pixel).collect();
+    let axis = unit([(centre[0] - camera.cx_px) / camera.fx_px, (centre[1] - camera.cy_px) / camera.fy_px, 1.0]);
+    (process(config, &data), axis)
+}
+
+/// Off the axis, a disc is an ellipse. Blur of a tenth of a pixel makes a circle of a small ellipse, and a large circle
+/// is a ghost.
+#[test]
+fn only_a_large_disc_is_told_from_a_circle() {
+    for (centre, radius_px) in [([205.3, 410.6], 9.0), ([70.8, 61.2], 6.4), ([520.1, 33.7], 12.3)] {
+        let mut config = sensor(640, 480, 1100.0);
+        let off = unit([centre[0] - 319.5, centre[1] - 239.5, 1100.0])[2];
+        let half_angle = (radius_px * off / 1100.0 * off.sqrt()).atan();
+        config.body.altitude_km = Some(1737.4 * (1.0 / half_angle.sin() - 1.0));
+        config.body.altitude_sigma_km = config.body.altitude_km.unwrap_or_default() * 0.02;
+        let (report, axis) = circle(&config, centre, radius_px);
+        assert_answer(&report, axis);
+    }
+    let mut config = sensor(640, 480, 500.0);
+    config.body.altitude_km = Some(1737.4 * (1.0 / 0.14f64.sin() - 1.0));
+    config.body.altitude_sigma_km = config.body.altitude_km.unwrap_or_default() * 0.1;
+    let (report, _) = circle(&config, [500.0, 100.0], 86.0);
+    assert_eq!(report.candidates.first().map(|c| c.verdict), Some(Verdict::Circle), "{report:?}");
+    assert!(report.solution.is_none());
+}
+
 /// Draws an outline of the mean radius 22 px: `radius_px` is its radius by the angle. The Earth has this size from
 /// 36 000 km through a lens of 150 px.
 fn outline(radius_px: impl Fn(f64) -> f64) -> (Config, Vec<u8>) {

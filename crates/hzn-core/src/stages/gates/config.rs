@@ -102,7 +102,8 @@ section! {
         /// Floor of the noise in the second test of the half-angle, px; this test takes the noise from the residuals,
         /// even if the told noise is larger. With 0 the test is off, and with 1e4 it uses the told noise.
         ///
-        /// The limit is `max_half_angle_sigma`. A larger value refuses fewer edges.
+        /// The limit is `max_half_angle_sigma`. A larger value refuses fewer edges. A disc with a radius below 46.5 px
+        /// is compared with a circle only if its residuals exceed `max_rival_ratio` times this floor.
         @- residual_floor_px: f64 = 0.1, [0.0 to 1e4];
         /// Longest smooth continuation of an edge next to the fitted limb, as a part of its longest run of inliers; 1e6
         /// turns the gate off.

@@ -11,7 +11,7 @@ use crate::model::verdict::Verdict;
 /// half side, with a = π/6 and the mean m = ln(tan(π/3))/a. An outline that is no rounder than a hexagon is the corner
 /// of a chessboard or a patch of light, and no disc. The Earth from afar, lit in part, has up to 2.3 %, and 90 % of
 /// such limbs have up to 0.6 % (kind `far` of `tests/python/decoy_campaign.py`).
-const FULL_RADIUS_PX: f64 = 46.5;
+pub(super) const FULL_RADIUS_PX: f64 = 46.5;
 /// Smallest part of the limit: half a pixel of the default. Blur and sampling cause as much on an outline of a few
 /// pixels.
 const LEAST_PART: f64 = 0.25;
@@ -28,10 +28,15 @@ fn part_of_disc<T: Real>(case: &Case<'_, T>) -> T {
     if case.expected.free {
         return T::one();
     }
+    let part = radius_px(case) * T::from_f64(1.0 / FULL_RADIUS_PX);
+    part.max(T::from_f64(LEAST_PART)).min(T::one())
+}
+
+/// Returns the radius of the fitted disc in the middle of the picture, in pixels.
+pub(super) fn radius_px<T: Real>(case: &Case<'_, T>) -> T {
     let (fx, fy) = case.camera.focal_px();
     // sin² α = k (2 − k) with k = 1 − cos α keeps the precision of a small disc.
     let k = case.fit.k;
     let sin = (k * (T::from_f64(2.0) - k)).max(T::ZERO).sqrt();
-    let part = sin * (fx + fy) * T::from_f64(0.5 / FULL_RADIUS_PX);
-    part.max(T::from_f64(LEAST_PART)).min(T::one())
+    sin * (fx + fy) * T::from_f64(0.5)
 }

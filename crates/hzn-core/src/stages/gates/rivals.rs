@@ -28,6 +28,6 @@ pub(super) fn refuse<T: Real>(case: &Case<'_, T>, residuals: &mut Residuals<'_, 
 fn compare<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>) -> Result<(), Verdict> {
     straight::refuse(residuals)?;
     any_cone::refuse(case, residuals)?;
-    circle::refuse(residuals)?;
+    circle::refuse(case, residuals)?;
     polyline::refuse(residuals)
 }
