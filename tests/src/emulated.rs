@@ -20,6 +20,9 @@ pub enum Board {
     /// Cortex-M4F with 192 KiB of RAM. It has only the images `flight`, which takes the rows of a picture one by one,
     /// and `example`.
     Stm32F405,
+    /// Code for a Cortex-M0+, which the Cortex-M7 runs. It has only the images for thermal arrays, without memory for a
+    /// picture.
+    Array,
 }
 
 impl Board {
@@ -42,6 +45,7 @@ impl Board {
             Self::An386 => "an386",
             Self::An500 => "an500",
             Self::Stm32F405 => "stm32f405",
+            Self::Array => "array",
         }
     }
 
@@ -49,7 +53,7 @@ impl Board {
     fn machine(self) -> &'static str {
         match self {
             Self::An386 => "mps2-an386",
-            Self::An500 => "mps2-an500",
+            Self::An500 | Self::Array => "mps2-an500",
             Self::Stm32F405 => "netduinoplus2",
         }
     }
@@ -59,6 +63,7 @@ impl Board {
         match self {
             Self::An386 | Self::Stm32F405 => "Cortex-M4F",
             Self::An500 => "Cortex-M7",
+            Self::Array => "Cortex-M0+",
         }
     }
 
@@ -258,12 +263,17 @@ pub fn chain_sensor() -> Config {
     config
 }
 
-/// Returns [`chain_sensor`] as it is prepared, with zeros behind it, and its length in bytes.
+/// Returns [`chain_sensor`] as [`page`].
 ///
 /// # Panics
 /// Panics if the configuration is refused.
 pub fn chain_page() -> ([u8; prepared::MAX_BYTES], usize) {
-    let sensor = Sensor::<f32>::new(&chain_sensor()).expect("the configuration is right");
+    page(&chain_sensor())
+}
+
+/// Returns a sensor as it is prepared, with zeros behind it, and its length in bytes.
+fn page(config: &Config) -> ([u8; prepared::MAX_BYTES], usize) {
+    let sensor = Sensor::<f32>::new(config).expect("the configuration is right");
     let mut page = [0; prepared::MAX_BYTES];
     let length = sensor.prepare(&mut page).expect("the page is long enough");
     (page, length)
@@ -290,6 +300,42 @@ pub fn run_example(picture: &[u8]) -> (Vec<u8>, u32) {
     let mut answer = run_files(Board::Stm32F405, "example", &[("picture.bin", picture)]);
     let stack_bytes = answer.split_off(answer.len() - 4);
     (answer, u32::from_le_bytes(stack_bytes.try_into().expect("four bytes")))
+}
+
+/// The answer of an image for a thermal array.
+#[derive(Debug, Clone, Copy)]
+pub struct ArrayAnswer {
+    /// Status of the picture.
+    pub status: u32,
+    /// Axis (3) and covariance (xx, xy, xz, yy, yz, zz), as bits of single-precision numbers; zeros without an answer.
+    pub direction: [u32; 9],
+    /// Instructions for all rows.
+    pub rows: u64,
+    /// Instructions for the end of the picture.
+    pub end: u64,
+    /// Largest stack so far, in bytes.
+    pub stack_bytes: u32,
+}
+
+/// Runs the pictures of a thermal array, one word of 16 bits per pixel, through an image for it.
+///
+/// # Panics
+/// Panics if QEMU or the image fails, or the configuration is refused.
+pub fn run_array(image: &str, config: &Config, pictures: &[Vec<u16>]) -> Vec<ArrayAnswer> {
+    let words: Vec<u8> = pictures.iter().flatten().flat_map(|pixel| pixel.to_le_bytes()).collect();
+    let answers = run_files(Board::Array, image, &[("sensor.bin", &page(config).0), ("pictures.bin", &words)]);
+    let answer = |words: &[u8; 52]| {
+        let mut words = words.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word));
+        let mut word = || words.next().expect("thirteen words are written");
+        ArrayAnswer {
+            status: word(),
+            direction: std::array::from_fn(|_| word()),
+            rows: instructions(word().into()),
+            end: instructions(word().into()),
+            stack_bytes: word(),
+        }
+    };
+    answers.as_chunks::<52>().0.iter().map(answer).collect()
 }
 
 /// Runs an image that reads files and writes `answer.bin`, and returns what it writes.

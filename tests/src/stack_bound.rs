@@ -43,12 +43,12 @@ pub struct StackBound {
 pub fn stack_bound(image: &Path) -> Result<StackBound, String> {
     let graph = Graph::read(image)?;
     let start = graph.functions.iter().find(|(_, f)| f.name == RESET).ok_or("the image has no reset handler")?;
-    let (bytes, path) = graph.deepest(*start.0, &mut Vec::new())?;
+    let (bytes, path) = graph.deepest(*start.0, &mut Vec::new()).map_err(|e| e.to_string())?;
     // A handler may interrupt the deepest place. Handlers of equal priority do not interrupt each other, and every port
     // leaves all of them at the priority of the reset.
     let mut exception_bytes = 0;
     for handler in &graph.handlers {
-        let (own, _) = graph.deepest(*handler, &mut Vec::new())?;
+        let (own, _) = graph.deepest(*handler, &mut Vec::new()).map_err(|e| e.to_string())?;
         exception_bytes = exception_bytes.max(own + EXCEPTION_BYTES);
     }
     let name = |at: u32| (graph.functions[&at].name.clone(), graph.functions[&at].frame_bytes);
@@ -86,26 +86,48 @@ impl Graph {
 
     /// Returns the bytes of the deepest path that begins with a call of the function at `start`. `above` has the
     /// functions that have led to it.
-    fn deepest(&self, start: u32, above: &mut Vec<u32>) -> Result<(u32, Vec<u32>), String> {
+    fn deepest(&self, start: u32, above: &mut Vec<u32>) -> Result<(u32, Vec<u32>), Recursion> {
         let function = &self.functions[&start];
-        if above.contains(&start) {
-            return Err(format!("{} calls itself", function.name));
+        if let Some(place) = above.iter().position(|at| *at == start) {
+            return Err(Recursion { name: function.name.clone(), place });
         }
         above.push(start);
-        let pointed = if function.calls_pointer { self.pointed.clone() } else { BTreeSet::new() };
-        // A function that runs already is not called by a pointer: hzn has no recursion.
-        let pointed = pointed.into_iter().filter(|at| !above.contains(at));
-        let next: BTreeSet<u32> = function.calls.iter().copied().chain(pointed).collect();
+        let running = above.len();
         let mut deepest = (0, Vec::new());
-        for at in next {
-            let below = self.deepest(at, above)?;
+        let mut take = |below: (u32, Vec<u32>)| {
             if below.0 > deepest.0 {
                 deepest = below;
+            }
+        };
+        for at in &function.calls {
+            take(self.deepest(*at, above)?);
+        }
+        for at in self.pointed.iter().filter(|_| function.calls_pointer) {
+            match self.deepest(*at, above) {
+                Ok(below) => take(below),
+                // A function that leads back to one that runs already is not called by this pointer: hzn has no
+                // recursion.
+                Err(recursion) if recursion.place < running => above.truncate(running),
+                Err(recursion) => return Err(recursion),
             }
         }
         above.pop();
         deepest.1.insert(0, start);
         Ok((deepest.0 + function.frame_bytes, deepest.1))
+    }
+}
+
+/// A function calls itself.
+#[derive(Debug)]
+struct Recursion {
+    name: String,
+    /// Place of its first call among the functions that have led to the second one.
+    place: usize,
+}
+
+impl core::fmt::Display for Recursion {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{} calls itself", self.name)
     }
 }
 
@@ -129,8 +151,9 @@ fn sizes(symbols: &str) -> BTreeMap<u32, u32> {
 
 /// Reads the functions of a disassembly. After the end of a function come bytes that fill the gap to the next one.
 fn functions(code: &str, sizes: &BTreeMap<u32, u32>) -> Result<BTreeMap<u32, Function>, String> {
-    let mut functions = BTreeMap::new();
+    let (constants, mut functions) = (constants_in_code(code), BTreeMap::new());
     let mut current = None;
+    let mut moved = Moved::default();
     for line in code.lines() {
         if let Some((start, name)) = line.strip_suffix(">:").and_then(|l| l.split_once(" <")) {
             let start = u32::from_str_radix(start, 16).map_err(|e| format!("{line}: {e}"))?;
@@ -142,10 +165,69 @@ fn functions(code: &str, sizes: &BTreeMap<u32, u32>) -> Result<BTreeMap<u32, Fun
             && let Some(function) = functions.get_mut(&start)
         {
             let (name, operands) = instruction.split_once('\t').unwrap_or((instruction, ""));
+            let known = moved.follow(name, operands, &constants);
+            function.frame_bytes += known.unwrap_or(0);
+            if known.is_some() {
+                continue;
+            }
             function.add(name, operands).map_err(|what| format!("{}: {what}: {instruction}", function.name))?;
         }
     }
     Ok(functions)
+}
+
+/// A register from which a Cortex-M0+ sets its stack pointer: it has no constant of more than 508 bytes in an
+/// instruction.
+#[derive(Debug, Default)]
+struct Moved(Option<(String, Value)>);
+
+/// What the register has.
+#[derive(Debug, Clone, Copy)]
+enum Value {
+    /// A constant of the code.
+    Constant(u32),
+    /// The frame pointer r7 minus the registers that were pushed after it was set: the stack pointer as it was before.
+    Before,
+}
+
+impl Moved {
+    /// Follows the register through an instruction. Returns the bytes by which the instruction moves the stack pointer
+    /// down by means of the register; `None` if it does not use it.
+    fn follow(&mut self, name: &str, operands: &str, constants: &BTreeMap<u32, u32>) -> Option<u32> {
+        let (to, from) = operands.split_once(", ")?;
+        if to == "sp" && matches!(name, "add" | "mov") {
+            let (register, value) = self.0.take()?;
+            return match value {
+                Value::Constant(bytes) if name == "add" && from == register => {
+                    Some((bytes as i32).min(0).unsigned_abs())
+                }
+                Value::Before if name == "mov" && from == register => Some(0),
+                _ => None,
+            };
+        }
+        let constant = || {
+            let at = from.strip_prefix("[pc, ")?.split_once("@ (")?.1.split(' ').next()?;
+            constants.get(&u32::from_str_radix(at, 16).ok()?).copied()
+        };
+        match (name, &self.0) {
+            ("subs", _) if from.starts_with("r7, #") => self.0 = Some((to.to_owned(), Value::Before)),
+            ("subs", Some((register, Value::Before))) if register == to && from.starts_with('#') => {}
+            ("ldr", _) => self.0 = constant().map(|bytes| (to.to_owned(), Value::Constant(bytes))),
+            (_, Some((register, _))) if register == to => self.0 = None,
+            _ => {}
+        }
+        None
+    }
+}
+
+/// Returns the words between the functions, by their addresses.
+fn constants_in_code(code: &str) -> BTreeMap<u32, u32> {
+    let word = |line: &str| {
+        let (at, value) = line.split_once(":\t.word\t")?;
+        let number = |text: &str| u32::from_str_radix(text.trim().trim_start_matches("0x"), 16).ok();
+        Some((number(at)?, number(value)?))
+    };
+    code.lines().filter_map(word).collect()
 }
 
 impl Function {
@@ -269,8 +351,14 @@ mod tests {
         graph.functions.get_mut(&0x100).unwrap().calls.remove(&0x106);
         let (bytes, path) = graph.deepest(0x100, &mut Vec::new()).unwrap();
         assert_eq!((bytes, path), (1040 + 40 + 8, vec![0x100, 0x200, 0x300]));
-        graph.functions.get_mut(&0x300).unwrap().calls.insert(0x200);
-        assert_eq!(graph.deepest(0x100, &mut Vec::new()).unwrap_err(), "low calls itself");
+        // A pointer does not lead back to a function that runs, but a call does.
+        graph.functions.get_mut(&0x300).unwrap().calls.insert(0x100);
+        assert_eq!(graph.deepest(0x100, &mut Vec::new()).unwrap_err().to_string(), "Reset calls itself");
+        graph.functions.get_mut(&0x200).unwrap().calls.clear();
+        assert_eq!(graph.deepest(0x100, &mut Vec::new()).unwrap().0, 1040 + 40);
+        graph.functions.get_mut(&0x200).unwrap().calls.insert(0x300);
+        graph.functions.get_mut(&0x300).unwrap().calls = [0x200].into();
+        assert_eq!(graph.deepest(0x100, &mut Vec::new()).unwrap_err().to_string(), "low calls itself");
     }
 
     #[test]
@@ -280,6 +368,26 @@ mod tests {
         assert!(with("mov\tsp, r4").unwrap_err().contains("Reset: changes the stack pointer in an unknown way"));
         assert!(with("sub\tsp, r4").unwrap_err().contains("by an unknown amount"));
         assert!(with("stmia.w\tsp, {r0, r1}").is_ok());
+    }
+
+    #[test]
+    fn frames_of_a_cortex_m0_are_constants_of_the_code() {
+        let code = "
+00000100 <large>:
+     100:\tpush\t{r4, r5, r6, r7, lr}
+     102:\tadd\tr7, sp, #12
+     104:\tldr\tr6, [pc, #16]\t@ (118 <large+0x18>)
+     106:\tadd\tsp, r6
+     108:\tbl\t200 <low>
+     10c:\tsubs\tr6, r7, #7
+     10e:\tsubs\tr6, #5
+     110:\tmov\tsp, r6
+     112:\tpop\t{r4, r5, r6, r7, pc}
+     118:\t.word\t0xfffff064
+";
+        assert_eq!(functions(code, &BTreeMap::new()).unwrap()[&0x100].frame_bytes, 20 + 0xf9c);
+        let other = code.replace("mov\tsp, r6", "mov\tsp, r5");
+        assert!(functions(&other, &BTreeMap::new()).unwrap_err().contains("large: changes the stack pointer"));
     }
 
     #[test]

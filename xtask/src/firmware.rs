@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::flight_build::Toolchain;
+use crate::flight_build::{TARGET, Toolchain};
 use crate::machine::{apt_install, output, root, target};
 use crate::soft_double;
 use crate::steps::{self, Outcome, Steps, Trouble, cargo};
@@ -13,29 +13,48 @@ use crate::test_build::build_tests;
 /// A core that the compiler knows. The images for it share one folder of the build, so that nothing is compiled twice.
 #[derive(Clone, Copy)]
 struct Core {
+    target: &'static str,
     dir: &'static str,
     /// Flags of the compiler.
     flags: &'static str,
 }
-const M4: Core = Core { dir: "firmware/m4", flags: "" };
-const M7: Core = Core { dir: "firmware/m7", flags: "-C target-cpu=cortex-m7" };
+const M0: Core = Core { target: "thumbv6m-none-eabi", dir: "firmware/m0", flags: "" };
+const M4: Core = Core { target: TARGET, dir: "firmware/m4", flags: "" };
+const M7: Core = Core { target: TARGET, dir: "firmware/m7", flags: "-C target-cpu=cortex-m7" };
 
 /// A board that QEMU emulates.
 struct Board {
     name: &'static str,
     package: &'static str,
+    features: &'static [&'static str],
     core: Core,
     images: &'static [&'static str],
     /// Images that are built and run in every check.
     always: &'static [&'static str],
 }
-const AN386: Board = Board { name: "an386", package: "hzn-mps2", core: M4, images: &IMAGES, always: &["chain"] };
+const AN386: Board = Board {
+    name: "an386",
+    package: "hzn-mps2",
+    features: &["--features", "an386"],
+    core: M4,
+    images: &IMAGES,
+    always: &["chain"],
+};
 const AN500: Board =
-    Board { name: "an500", package: "hzn-mps2", core: M7, images: &IMAGES, always: &["flight", "nav"] };
-const BOARDS: [Board; 3] = [
+    Board { name: "an500", features: &["--features", "an500"], core: M7, always: &["flight", "nav"], ..AN386 };
+const BOARDS: [Board; 4] = [
     AN386,
     AN500,
-    Board { name: "stm32f405", package: "hzn-stm32f405", core: M4, images: &["example", "flight"], always: &[] },
+    Board {
+        name: "stm32f405",
+        package: "hzn-stm32f405",
+        features: &[],
+        core: M4,
+        images: &["example", "flight"],
+        always: &[],
+    },
+    // Code for a Cortex-M0+, which the Cortex-M7 of the board runs.
+    Board { name: "array", core: M0, images: &["array160", "array32"], always: &[], ..AN500 },
 ];
 /// Images of the boards with memory for pictures.
 const IMAGES: [&str; 8] = ["chain", "flight", "line", "measure", "nav", "rig", "rows", "track"];
@@ -44,12 +63,12 @@ const COSTS: &str = "book/results/firmware-cost.md";
 
 impl Board {
     /// Builds these images and puts them where the tests find them: `target/firmware/BOARD/images`.
-    fn build_images(&self, toolchain: Toolchain, images: &[&str]) -> Outcome {
+    fn build_images(&self, images: &'static [&'static str]) -> Outcome {
         if images.is_empty() {
             return Ok(());
         }
-        let bins: Vec<&str> = images.iter().flat_map(|image| ["--bin", image]).collect();
-        let built = self.build(toolchain, "build", self.core.dir, &root(), &bins)?;
+        let toolchain = Toolchain::find_for(self.core.target)?;
+        let built = self.build(toolchain, "build", self.core.dir, &root(), &bins(images))?;
         let folder = images_of(self.name);
         fs::create_dir_all(&folder)?;
         for image in images {
@@ -69,12 +88,16 @@ impl Board {
         clone: &Path,
         more: &[&str],
     ) -> Result<PathBuf, Trouble> {
-        let features = if self.package == "hzn-mps2" { &["--features", self.name][..] } else { &[] };
-        let args = [&["--package", self.package], features, more].concat();
-        let (mut command, built) = toolchain.cargo(verb, dir, &args);
+        let args = [&["--package", self.package], self.features, more].concat();
+        let (mut command, built) = toolchain.cargo_for(self.core.target, "flight", verb, dir, &args);
         steps::run(configure_for_firmware(&mut command, self.core.flags).current_dir(clone.join("firmware")))?;
         Ok(built)
     }
+}
+
+/// Returns the arguments that choose images.
+fn bins(images: &'static [&'static str]) -> Vec<&'static str> {
+    images.iter().flat_map(|image| ["--bin", image]).collect()
 }
 
 /// Checks that hzn-core compiles without the features that the images add. They link it, so this makes no code.
@@ -86,8 +109,7 @@ pub(crate) fn check_core() -> Outcome {
 /// Builds every image, or those that run in every check.
 fn build(every_image: bool) -> Outcome {
     apt_install(&["qemu-system-arm", "binutils-arm-none-eabi", "gcc-arm-none-eabi"])?;
-    let toolchain = Toolchain::find()?;
-    BOARDS.iter().try_for_each(|b| b.build_images(toolchain, if every_image { b.images } else { b.always }))?;
+    BOARDS.iter().try_for_each(|b| b.build_images(if every_image { b.images } else { b.always }))?;
     if every_image { build_image_with_keys() } else { Ok(()) }
 }
 
@@ -96,7 +118,8 @@ pub(crate) fn is_the_same_elsewhere(clone: &Path) -> Outcome {
     build(true)?;
     for board in BOARDS {
         let dir = format!("xtask/elsewhere/{}", board.name);
-        let built = board.build(Toolchain::find()?, "build", &dir, clone, &[])?;
+        let toolchain = Toolchain::find_for(board.core.target)?;
+        let built = board.build(toolchain, "build", &dir, clone, &bins(board.images))?;
         for image in board.images {
             steps::compare_bytes(
                 &format!("{} {image}", board.name),
@@ -178,7 +201,16 @@ fn test_every_image(steps: &mut Steps) -> Outcome {
     run_image_tests(
         steps,
         "",
-        &["authenticated::", "firmware::", "line_cost::", "navigation::", "recovery::", "rig_image::", "silence::"],
+        &[
+            "arrays::",
+            "authenticated::",
+            "firmware::",
+            "line_cost::",
+            "navigation::",
+            "recovery::",
+            "rig_image::",
+            "silence::",
+        ],
     )?;
     compare_costs("--check")
 }
@@ -203,8 +235,12 @@ fn lint(every_image: bool) -> Outcome {
         println!("lints of the images are skipped: Debian's Rust has no clippy for the target");
         return Ok(());
     }
-    // The flags of a core change no lint, so all boards are checked with those of one.
-    BOARDS.iter().filter(|board| every_image || !board.always.is_empty()).try_for_each(|board| {
+    // The core changes no lint, so all boards are checked as one core. The images for arrays are among those of a board.
+    let mut boards = BOARDS.iter().filter(|board| board.core.target == TARGET);
+    boards.try_for_each(|board| {
+        if !every_image && board.always.is_empty() {
+            return Ok(());
+        }
         let board = Board { core: M4, ..*board };
         board.build(toolchain, "clippy", M4.dir, &root(), &["--", "-D", "warnings"]).map(|_| ())
     })

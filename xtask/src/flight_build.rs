@@ -22,20 +22,26 @@ pub(crate) enum Toolchain {
 }
 
 impl Toolchain {
-    /// Returns the first toolchain that works.
+    /// Returns the first toolchain that works for [`TARGET`].
     pub(crate) fn find() -> Result<Self, Trouble> {
+        Self::find_for(TARGET)
+    }
+
+    /// Returns the first toolchain that works for a target.
+    pub(crate) fn find_for(target: &str) -> Result<Self, Trouble> {
         let add = || {
             has("rustup")
-                && run_within(Command::new("rustup").args(["target", "add", TARGET]), Duration::from_secs(60))
-                && has_core_library()
+                && run_within(Command::new("rustup").args(["target", "add", target]), Duration::from_secs(60))
+                && has_core_library(target)
         };
-        if has_core_library() || add() {
+        if has_core_library(target) || add() {
             return Ok(Self::Own);
         }
-        apt_install(&["rustc-web", "cargo-web", "rust-web-src", "rust-web-llvm"]).map_err(with_rustup_hint)?;
+        apt_install(&["rustc-web", "cargo-web", "rust-web-src", "rust-web-llvm"])
+            .map_err(|trouble| with_rustup_hint(trouble, target))?;
         if !has_debian_rust() {
             return Err(Trouble::Missing(format!(
-                "needs `rustup target add {TARGET}`: Debian's Rust is not installed"
+                "needs `rustup target add {target}`: Debian's Rust is not installed"
             )));
         }
         // The linker of bare targets, `rust-lld`, is a symbolic link into a package like `lld-22`. None of the packages
@@ -44,7 +50,7 @@ impl Toolchain {
             && let Ok(to) = std::fs::read_link("/usr/bin/rust-lld")
             && let Some(lld) = to.file_name().and_then(|n| n.to_str()).filter(|n| n.starts_with("lld-"))
         {
-            apt_install(&[lld]).map_err(with_rustup_hint)?;
+            apt_install(&[lld]).map_err(|trouble| with_rustup_hint(trouble, target))?;
         }
         Ok(Self::Debian)
     }
@@ -57,6 +63,18 @@ impl Toolchain {
 
     /// Returns the same as [`Self::cargo`], with another profile.
     pub(crate) fn cargo_with_profile(self, profile: &str, verb: &str, dir: &str, args: &[&str]) -> (Command, PathBuf) {
+        self.cargo_for(TARGET, profile, verb, dir, args)
+    }
+
+    /// Returns the same as [`Self::cargo_with_profile`], for another target.
+    pub(crate) fn cargo_for(
+        self,
+        chosen: &str,
+        profile: &str,
+        verb: &str,
+        dir: &str,
+        args: &[&str],
+    ) -> (Command, PathBuf) {
         let dir = target().join(dir);
         let mut command = match self {
             Self::Own => cargo(&[verb, "--profile", profile]),
@@ -70,22 +88,22 @@ impl Toolchain {
             }
         };
         command.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
-        command.args(["--target", TARGET, "--target-dir"]).arg(&dir).args(args);
-        (command, dir.join(TARGET).join(profile))
+        command.args(["--target", chosen, "--target-dir"]).arg(&dir).args(args);
+        (command, dir.join(chosen).join(profile))
     }
 }
 
-fn with_rustup_hint(trouble: Trouble) -> Trouble {
+fn with_rustup_hint(trouble: Trouble, target: &str) -> Trouble {
     match trouble {
-        Trouble::Missing(how) => Trouble::Missing(format!("needs `rustup target add {TARGET}`, or {how}")),
+        Trouble::Missing(how) => Trouble::Missing(format!("needs `rustup target add {target}`, or {how}")),
         failed => failed,
     }
 }
 
 /// Returns whether the toolchain on PATH has a compiled core library for the target.
-fn has_core_library() -> bool {
+fn has_core_library(target: &str) -> bool {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
-    let dir = output(Command::new(rustc).args(["--print", "target-libdir", "--target", TARGET]));
+    let dir = output(Command::new(rustc).args(["--print", "target-libdir", "--target", target]));
     let entries = dir.and_then(|d| std::fs::read_dir(d).ok());
     entries.is_some_and(|mut files| {
         files.any(|f| f.is_ok_and(|f| f.file_name().to_string_lossy().starts_with("libcore-")))

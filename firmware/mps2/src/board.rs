@@ -42,7 +42,13 @@ pub struct Board {
 impl Board {
     /// Takes the board. Returns `None` the second time.
     pub fn take() -> Option<Self> {
-        if TAKEN.swap(true, Ordering::Relaxed) {
+        // A Cortex-M0+ can load and store a flag, but cannot exchange it.
+        let taken = cortex_m::interrupt::free(|_| {
+            let taken = TAKEN.load(Ordering::Relaxed);
+            TAKEN.store(true, Ordering::Relaxed);
+            taken
+        });
+        if taken {
             return None;
         }
         let frames = core::array::from_fn(|i| {

@@ -1,6 +1,7 @@
 //! Tests of the whole chain: rendered scenes with truth, photographs, and images in the emulator.
 
 mod accuracy_table;
+mod arrays;
 mod artefacts;
 mod authenticated;
 mod compiled;

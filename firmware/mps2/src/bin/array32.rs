@@ -1,0 +1,34 @@
+//! The sensor of an array of 32×24 pixels; [`hzn_mps2::array`] describes the files.
+
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use hzn_core::SensorPlace;
+use hzn_core::pipeline::{ROWS_HELD, RowBuffers, Workspace};
+use hzn_mps2::array;
+use hzn_mps2::host::exit;
+use static_cell::ConstStaticCell;
+
+const WIDTH: usize = 32;
+const HEIGHT: usize = 24;
+/// Has room for 96 border pixels of all edges, and for 128 changes between dark and lit.
+type Rows = RowBuffers<u16, { ROWS_HELD as usize * WIDTH }, HEIGHT, 128, 96>;
+/// Has room for 96 points of an edge.
+type Lists = Workspace<f32, 96, 12, 32>;
+
+static SENSOR: ConstStaticCell<SensorPlace<f32>> = ConstStaticCell::new(SensorPlace::empty());
+static ROWS: ConstStaticCell<Rows> = ConstStaticCell::new(Rows::new());
+static LISTS: ConstStaticCell<Lists> = ConstStaticCell::new(Lists::new());
+
+#[entry]
+fn main() -> ! {
+    exit(match run() {
+        Some(()) => 0,
+        None => 1,
+    })
+}
+
+fn run() -> Option<()> {
+    array::run(SENSOR.try_take()?, ROWS.try_take()?, LISTS.try_take()?)
+}
