@@ -23,6 +23,8 @@ pub enum Board {
     /// Code for a Cortex-M0+, which the Cortex-M7 runs. It has only the images for thermal arrays, without memory for a
     /// picture.
     Array,
+    /// 32-bit RISC-V without a floating-point unit. It has only the image for an array of 160×120 pixels.
+    RiscV,
 }
 
 impl Board {
@@ -46,6 +48,7 @@ impl Board {
             Self::An500 => "an500",
             Self::Stm32F405 => "stm32f405",
             Self::Array => "array",
+            Self::RiscV => "riscv",
         }
     }
 
@@ -55,6 +58,7 @@ impl Board {
             Self::An386 => "mps2-an386",
             Self::An500 | Self::Array => "mps2-an500",
             Self::Stm32F405 => "netduinoplus2",
+            Self::RiscV => "virt",
         }
     }
 
@@ -64,6 +68,7 @@ impl Board {
             Self::An386 | Self::Stm32F405 => "Cortex-M4F",
             Self::An500 => "Cortex-M7",
             Self::Array => "Cortex-M0+",
+            Self::RiscV => "RISC-V",
         }
     }
 
@@ -83,7 +88,10 @@ impl Board {
     /// the timer counts single instructions. With 0 the board's clock is slower than that of this machine, so serial
     /// input arrives in time even on a busy machine.
     pub fn qemu(self, image: &Path, shift: u32) -> Command {
-        let mut command = Command::new("qemu-system-arm");
+        let mut command = Command::new(if self == Self::RiscV { "qemu-system-riscv32" } else { "qemu-system-arm" });
+        if self == Self::RiscV {
+            command.args(["-bios", "none"]);
+        }
         command
             .args(["-M", self.machine(), "-display", "none", "-monitor", "none"])
             .args(["-semihosting-config", "enable=on,target=native", "-icount", &format!("shift={shift}"), "-kernel"])
@@ -317,21 +325,23 @@ pub struct ArrayAnswer {
     pub stack_bytes: u32,
 }
 
-/// Runs the pictures of a thermal array, one word of 16 bits per pixel, through an image for it.
+/// Runs the pictures of a thermal array, one word of 16 bits per pixel, through an image of a board for it.
 ///
 /// # Panics
 /// Panics if QEMU or the image fails, or the configuration is refused.
-pub fn run_array(image: &str, config: &Config, pictures: &[Vec<u16>]) -> Vec<ArrayAnswer> {
+pub fn run_array(board: Board, image: &str, config: &Config, pictures: &[Vec<u16>]) -> Vec<ArrayAnswer> {
     let words: Vec<u8> = pictures.iter().flatten().flat_map(|pixel| pixel.to_le_bytes()).collect();
-    let answers = run_files(Board::Array, image, &[("sensor.bin", &page(config).0), ("pictures.bin", &words)]);
+    let answers = run_files(board, image, &[("sensor.bin", &page(config).0), ("pictures.bin", &words)]);
+    // The clock of the RISC-V counts instructions.
+    let count = if board == Board::RiscV { u64::from } else { instructions };
     let answer = |words: &[u8; 52]| {
         let mut words = words.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word));
         let mut word = || words.next().expect("thirteen words are written");
         ArrayAnswer {
             status: word(),
             direction: std::array::from_fn(|_| word()),
-            rows: instructions(word().into()),
-            end: instructions(word().into()),
+            rows: count(word().into()),
+            end: count(word().into()),
             stack_bytes: word(),
         }
     };
@@ -344,8 +354,10 @@ fn run_files(board: Board, image: &str, files: &[(&str, &[u8])]) -> Vec<u8> {
     for (name, bytes) in files {
         std::fs::write(dir.path().join(name), bytes).expect("the folder is writable");
     }
-    let status = board.qemu(&board.image(image), 10).args(["-serial", "null"]).current_dir(dir.path()).status();
-    let status = status.expect("qemu-system-arm is installed");
+    // The counter of the RISC-V's instructions counts nanoseconds of the exact clock.
+    let shift = if board == Board::RiscV { 0 } else { 10 };
+    let status = board.qemu(&board.image(image), shift).args(["-serial", "null"]).current_dir(dir.path()).status();
+    let status = status.expect("QEMU is installed");
     assert!(status.success(), "{}: the image ended with {status}", board.name());
     std::fs::read(dir.path().join("answer.bin")).expect("the image wrote its answer")
 }
@@ -365,7 +377,7 @@ fn run_cases(board: Board, image: &str, cases: &[u8]) -> Vec<u8> {
     let dir = tempfile::tempdir().expect("a temporary folder can be made");
     std::fs::write(dir.path().join("cases.bin"), cases).expect("the folder is writable");
     let status = board.qemu(&board.image(image), 10).args(["-serial", "null"]).current_dir(dir.path()).status();
-    let status = status.expect("qemu-system-arm is installed");
+    let status = status.expect("QEMU is installed");
     assert!(status.success(), "{}: the image ended with {status}", board.name());
     std::fs::read(dir.path().join("results.bin")).expect("the image wrote its results")
 }

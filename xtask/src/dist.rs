@@ -57,6 +57,7 @@ const UNPUBLISHED: &[&str] = &[
     "hzn-stm32f405",
     "hzn-stm32h743",
     "hzn-supply",
+    "hzn-virt",
 ];
 
 /// Returns the arguments of cargo that leave out the packages that are not published.

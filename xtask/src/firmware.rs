@@ -22,6 +22,8 @@ const M0: Core = Core { target: "thumbv6m-none-eabi", dir: "firmware/m0", flags:
 const M4: Core = Core { target: TARGET, dir: "firmware/m4", flags: "" };
 const M7: Core = Core { target: TARGET, dir: "firmware/m7", flags: "-C target-cpu=cortex-m7" };
 
+const RISCV: Core = Core { target: "riscv32imac-unknown-none-elf", dir: "firmware/riscv", flags: "" };
+
 /// A board that QEMU emulates.
 struct Board {
     name: &'static str,
@@ -42,7 +44,7 @@ const AN386: Board = Board {
 };
 const AN500: Board =
     Board { name: "an500", features: &["--features", "an500"], core: M7, always: &["flight", "nav"], ..AN386 };
-const BOARDS: [Board; 4] = [
+const BOARDS: [Board; 5] = [
     AN386,
     AN500,
     Board {
@@ -55,6 +57,7 @@ const BOARDS: [Board; 4] = [
     },
     // Code for a Cortex-M0+, which the Cortex-M7 of the board runs.
     Board { name: "array", core: M0, images: &["array160", "array32"], always: &[], ..AN500 },
+    Board { name: "riscv", package: "hzn-virt", features: &[], core: RISCV, images: &["array160"], always: &[] },
 ];
 /// Images of the boards with memory for pictures.
 const IMAGES: [&str; 8] = ["chain", "flight", "line", "measure", "nav", "rig", "rows", "track"];
@@ -109,6 +112,10 @@ pub(crate) fn check_core() -> Outcome {
 /// Builds every image, or those that run in every check.
 fn build(every_image: bool) -> Outcome {
     apt_install(&["qemu-system-arm", "binutils-arm-none-eabi", "gcc-arm-none-eabi"])?;
+    if every_image {
+        // It has the emulator of the RISC-V.
+        apt_install(&["qemu-system-misc"])?;
+    }
     BOARDS.iter().try_for_each(|b| b.build_images(if every_image { b.images } else { b.always }))?;
     if every_image { build_image_with_keys() } else { Ok(()) }
 }
@@ -230,20 +237,22 @@ fn run_image_tests(steps: &mut Steps, board: &str, filters: &[&str]) -> Outcome 
 /// Runs the lints of the images, or of those that every check runs. The steps of the whole workspace have those of
 /// hzn-c.
 fn lint(every_image: bool) -> Outcome {
-    let toolchain = Toolchain::find()?;
-    if matches!(toolchain, Toolchain::Debian) {
-        println!("lints of the images are skipped: Debian's Rust has no clippy for the target");
-        return Ok(());
-    }
-    // The core changes no lint, so all boards are checked as one core. The images for arrays are among those of a board.
-    let mut boards = BOARDS.iter().filter(|board| board.core.target == TARGET);
-    boards.try_for_each(|board| {
-        if !every_image && board.always.is_empty() {
+    for board in BOARDS {
+        // The images for a Cortex-M0+ are among those of another board.
+        if board.core.target == M0.target || !every_image && board.always.is_empty() {
+            continue;
+        }
+        let toolchain = Toolchain::find_for(board.core.target)?;
+        if matches!(toolchain, Toolchain::Debian) {
+            println!("lints of the images are skipped: Debian's Rust has no clippy for the target");
             return Ok(());
         }
-        let board = Board { core: M4, ..*board };
-        board.build(toolchain, "clippy", M4.dir, &root(), &["--", "-D", "warnings"]).map(|_| ())
-    })
+        // The core changes no lint, so boards of the same target are checked as one core.
+        let core = if board.core.target == TARGET { M4 } else { board.core };
+        let board = Board { core, ..board };
+        board.build(toolchain, "clippy", core.dir, &root(), &["--", "-D", "warnings"])?;
+    }
+    Ok(())
 }
 
 /// Every feature that adds methods to hzn-core.

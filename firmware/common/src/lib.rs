@@ -2,6 +2,7 @@
 //!
 //! | module | idea |
 //! |---|---|
+//! | [`array`] | the sensor of a thermal array |
 //! | [`camera`] | a camera that is a file of the host |
 //! | [`flash`] | the memory of the parameters, in files of the host |
 //! | [`host`] | files of the computer that emulates the board, by semihosting |
@@ -11,11 +12,13 @@
 
 #![no_std]
 
+pub mod array;
 pub mod camera;
 pub mod flash;
 pub mod host;
 pub mod image;
 pub mod keys;
+mod semihosting;
 pub mod watermark;
 
 use core::panic::PanicInfo;
@@ -30,11 +33,15 @@ fn panic(_: &PanicInfo<'_>) -> ! {
     panic_path_is_linked()
 }
 
-/// Ends the run with the status 102 after a fault. Without a handler a fault would be an endless loop.
+/// The status with which a run ends after a fault.
+pub const FAULT: u32 = 102;
+
+/// Ends the run with the status [`FAULT`] after a fault. Without a handler a fault would be an endless loop.
 ///
 /// # Safety
 /// Only the processor may call it.
+#[cfg(target_arch = "arm")]
 #[cortex_m_rt::exception]
 unsafe fn HardFault(_: &cortex_m_rt::ExceptionFrame) -> ! {
-    host::exit(102)
+    host::exit(FAULT)
 }

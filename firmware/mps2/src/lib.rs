@@ -2,14 +2,12 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | [`array`] | the sensor of a small array |
 //! | [`board`] | external memory, timer, serial line, watchdog |
 //! | [`cases`] | the files of the images that measure the sensor |
 //! | [`port`] | the board for the flight software |
 
 #![no_std]
 
-pub mod array;
 pub mod board;
 pub mod cases;
 pub mod port;

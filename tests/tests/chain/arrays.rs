@@ -1,5 +1,5 @@
-//! Tests the images for thermal arrays: code for a Cortex-M0+ gives the same bits as this machine, within 24 and 48 KiB
-//! and more of RAM. The tests need the images that `cargo xtask test --all firmware` builds.
+//! Tests the images for thermal arrays: code for a Cortex-M0+ and for a RISC-V gives the same bits as this machine. The
+//! tests need the images that `cargo xtask test --all firmware` builds.
 
 use hzn_core::camera::{self, Model};
 use hzn_core::observer::Unobserved;
@@ -9,7 +9,7 @@ use hzn_core::{Config, Prior, Sensor, SensorPlace};
 use hzn_sim::flight::leo_infrared;
 use hzn_sim::pose::position_m;
 use hzn_sim::{FlightFrame, Look, Pose, Samples};
-use hzn_tests::emulated::{ArrayAnswer, run_array};
+use hzn_tests::emulated::{ArrayAnswer, Board, run_array};
 use hzn_tests::stack_bound::stack_bound;
 
 /// Altitude of the flight above the mean Earth.
@@ -69,29 +69,36 @@ fn answers_here<
     pictures.iter().map(&mut answer).collect()
 }
 
-/// Asserts that both machines agree, prints what a picture costs, and compares the RAM with what an image may take.
-fn compare(image: &str, there: &[ArrayAnswer], here: &[(u32, [u32; 9])], static_bytes: usize, most_bytes: usize) {
+/// Asserts that a board agrees with this machine, and prints what a picture costs. Returns the largest stack, in bytes.
+fn compare(board: Board, there: &[ArrayAnswer], here: &[(u32, [u32; 9])]) -> usize {
     let mut answered = 0;
     for (number, (there, here)) in there.iter().zip(here).enumerate() {
-        assert_eq!((there.status, there.direction), *here, "{image}, picture {number}");
+        assert_eq!((there.status, there.direction), *here, "{board:?}, picture {number}");
         answered += usize::from(here.0 == Status::Ok as u32);
     }
     assert_eq!(there.len(), here.len());
     // The first picture gives only the threshold of the second one.
-    assert!(10 * answered >= 9 * (here.len() - 1), "{image}: {answered} of {}", here.len());
-    let bound = stack_bound(&hzn_tests::emulated::Board::Array.image(image)).unwrap().bytes as usize;
-    let stack = there.iter().map(|a| a.stack_bytes).max().unwrap_or_default() as usize;
-    let most = |part: fn(&ArrayAnswer) -> u64| there.iter().map(part).max().unwrap_or_default() / 1000;
+    assert!(10 * answered >= 9 * (here.len() - 1), "{answered} of {}", here.len());
+    let most = |part: fn(&ArrayAnswer) -> u64| there.iter().map(part).max().unwrap_or_default();
     println!(
-        "{image}: {answered} of {} answered; at most {} thousand instructions for the rows and {} for the end; {} bytes \
-         of lists, {stack} of stack, at most {bound} by the calls, together {}",
+        "{}: {answered} of {} answered, with the same bits; at most {} thousand instructions for the rows and {} for \
+         the end",
+        board.core(),
         here.len(),
-        most(|a| a.rows),
-        most(|a| a.end),
-        static_bytes,
-        static_bytes + bound
+        most(|a| a.rows) / 1000,
+        most(|a| a.end) / 1000,
     );
-    assert!(stack <= bound && static_bytes + bound <= most_bytes, "{image}: {} bytes", static_bytes + bound);
+    most(|a| a.stack_bytes.into()) as usize
+}
+
+/// Asserts that lists and stack of an image for a Cortex-M0+ take at most this number of bytes.
+fn assert_ram(image: &str, list_bytes: usize, stack_bytes: usize, most_bytes: usize) {
+    let bound = stack_bound(&Board::Array.image(image)).unwrap().bytes as usize;
+    let all = list_bytes + bound;
+    println!(
+        "{image}: {list_bytes} bytes of lists, {stack_bytes} of stack, at most {bound} by the calls, together {all}"
+    );
+    assert!(stack_bytes <= bound && all <= most_bytes, "{image}: {all} bytes");
 }
 
 #[test]
@@ -101,8 +108,13 @@ fn an_array_of_160_columns_fits_into_48_kib() {
     type Lists = Workspace<f32, 320, 20, 160>;
     let (config, pictures) = pictures(&camera::Config::ideal(Model::Equidistant, 160, 120, 160.8), 12, 31);
     let here = answers_here(&mut Rows::new(), &mut Lists::new(), &config, &pictures);
-    let bytes = size_of::<Rows>() + size_of::<Lists>() + size_of::<SensorPlace<f32>>();
-    compare("array160", &run_array("array160", &config, &pictures), &here, bytes, 48 * 1024);
+    let list_bytes = size_of::<Rows>() + size_of::<Lists>() + size_of::<SensorPlace<f32>>();
+    let stack_bytes = compare(Board::Array, &run_array(Board::Array, "array160", &config, &pictures), &here);
+    assert_ram("array160", list_bytes, stack_bytes, 48 * 1024);
+    // The linker gives the RISC-V 48 KiB of RAM. The stack is what the lists leave.
+    let stack_bytes = compare(Board::RiscV, &run_array(Board::RiscV, "array160", &config, &pictures), &here);
+    println!("RISC-V: {stack_bytes} bytes of stack");
+    assert!(list_bytes + stack_bytes < 48 * 1024, "{stack_bytes}");
 }
 
 /// An array of 32×24 needs 33 KiB and not 24: the sensor has 8 KiB, and the stack 18.
@@ -113,6 +125,7 @@ fn an_array_of_32_columns_fits_into_33_kib() {
     type Lists = Workspace<f32, 96, 12, 32>;
     let (config, pictures) = pictures(&camera::Config::ideal(Model::Equidistant, 32, 24, 16.67), 24, 32);
     let here = answers_here(&mut Rows::new(), &mut Lists::new(), &config, &pictures);
-    let bytes = size_of::<Rows>() + size_of::<Lists>() + size_of::<SensorPlace<f32>>();
-    compare("array32", &run_array("array32", &config, &pictures), &here, bytes, 33 * 1024);
+    let list_bytes = size_of::<Rows>() + size_of::<Lists>() + size_of::<SensorPlace<f32>>();
+    let stack_bytes = compare(Board::Array, &run_array(Board::Array, "array32", &config, &pictures), &here);
+    assert_ram("array32", list_bytes, stack_bytes, 33 * 1024);
 }

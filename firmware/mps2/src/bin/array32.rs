@@ -1,4 +1,4 @@
-//! The sensor of an array of 32×24 pixels; [`hzn_mps2::array`] describes the files.
+//! The sensor of an array of 32×24 pixels; [`hzn_firmware::array`] describes the files.
 
 #![no_std]
 #![no_main]
@@ -6,7 +6,9 @@
 use cortex_m_rt::entry;
 use hzn_core::SensorPlace;
 use hzn_core::pipeline::{ROWS_HELD, RowBuffers, Workspace};
-use hzn_mps2::array;
+use hzn_core::prepared::MAX_BYTES;
+use hzn_firmware::array;
+use hzn_mps2::board::Board;
 use hzn_mps2::host::exit;
 use static_cell::ConstStaticCell;
 
@@ -30,5 +32,7 @@ fn main() -> ! {
 }
 
 fn run() -> Option<()> {
-    array::run(SENSOR.try_take()?, ROWS.try_take()?, LISTS.try_take()?)
+    let Board { frames: [page, _], timer, .. } = Board::take()?;
+    let page = page.first_chunk_mut::<MAX_BYTES>()?;
+    array::run(page, || timer.ticks(), SENSOR.try_take()?, ROWS.try_take()?, LISTS.try_take()?)
 }

@@ -93,9 +93,9 @@ fn the_page_is_built_without_c() {
 
 /// Dependencies that the sources of their package need not name, with the reason.
 const UNNAMED: [(&str, &str, &str); 3] = [
-    ("hzn-mps2", "cortex-m", "its feature critical-section-single-core stops interrupts for the other crates"),
+    ("hzn-mps2", "portable-atomic", "its feature critical-section gives static_cell what a Cortex-M0+ lacks"),
     ("hzn-run", "kamadak-exif", "its library is called exif"),
-    ("hzn-stm32f405", "cortex-m", "as for hzn-mps2"),
+    ("hzn-stm32f405", "cortex-m", "its feature critical-section-single-core stops interrupts for the other crates"),
 ];
 
 /// A dependency that nothing uses would be kept up to date for nothing.

@@ -1,20 +1,20 @@
 //! The sensor of a thermal array: pictures come row by row, and nothing but the answer is kept.
 //!
-//! The images `array32` and `array160` have room for arrays of 32×24 and of 160×120 pixels. They are built for a
-//! Cortex-M0+ (no floating-point unit, no compare-and-swap), and run on any Cortex-M.
+//! The images `array32` and `array160` have room for arrays of 32×24 and of 160×120 pixels. They are built for
+//! processors without a floating-point unit: a Cortex-M0+, which has no compare-and-swap either, and a 32-bit RISC-V.
 //!
 //! `sensor.bin` is the sensor that `hzn prepare` writes, and zeros behind it, as a page of flash has; it is read into
-//! external memory, which stands for flash. `pictures.bin` is the pictures, one after another, with a little-endian word of 16 bits per pixel. Each picture takes its threshold
-//! from the one before. `answer.bin` has 13 little-endian words for each picture: status, axis (3), covariance (xx,
-//! xy, xz, yy, yz, zz), ticks of the rows, ticks of the end of the picture, and the high-water mark of the stack in
-//! bytes. Axis and covariance are single-precision numbers; the other words are integers.
+//! external memory, which stands for flash. `pictures.bin` is the pictures, one after another, with a little-endian
+//! word of 16 bits per pixel. Each picture takes its threshold from the one before. `answer.bin` has 13 little-endian
+//! words for each picture: status, axis (3), covariance (xx, xy, xz, yy, yz, zz), ticks of the rows, ticks of the end
+//! of the picture, and the high-water mark of the stack in bytes. Axis and covariance are single-precision numbers; the
+//! other words are integers.
 
 use hzn_core::observer::Unobserved;
 use hzn_core::pipeline::{RowBuffers, Workspace};
 use hzn_core::prepared::MAX_BYTES;
 use hzn_core::{Prior, Sensor, SensorPlace};
 
-use crate::board::Board;
 use crate::host::File;
 use crate::watermark;
 
@@ -25,7 +25,8 @@ const WORDS: usize = 13;
 /// Longest row.
 const MAX_WIDTH: usize = 160;
 
-/// Processes all pictures. Returns `None` if a file is missing or the sensor does not fit.
+/// Processes all pictures. `page` stands for the flash in which the sensor lies on the real part; `ticks` is the clock.
+/// Returns `None` if a file is missing or the sensor does not fit.
 pub fn run<
     const WINDOW: usize,
     const HEIGHT: usize,
@@ -35,19 +36,16 @@ pub fn run<
     const BLOCKS: usize,
     const MARKS: usize,
 >(
+    page: &mut [u8; MAX_BYTES],
+    ticks: impl Fn() -> u32,
     place: &mut SensorPlace<f32>,
     rows: &mut RowBuffers<u16, WINDOW, HEIGHT, TURNS, EDGES>,
     lists: &mut Workspace<f32, POINTS, BLOCKS, MARKS>,
 ) -> Option<()> {
-    let board = Board::take()?;
-    let timer = board.timer;
-    // Stands for the flash in which the sensor lies on the real part.
-    let [bytes, _] = board.frames;
-    let bytes = bytes.get_mut(..MAX_BYTES)?;
-    if !File::open(c"sensor.bin")?.read(bytes) {
+    if !File::open(c"sensor.bin")?.read(page) {
         return None;
     }
-    hzn_setup::load(place, bytes).ok()?;
+    hzn_setup::load(place, page).ok()?;
     let sensor = place.sensor()?;
     let mut pictures = File::open(c"pictures.bin")?;
     let mut answers = File::create(c"answer.bin")?;
@@ -59,13 +57,13 @@ pub fn run<
         let mut stream = sensor.rows(rows, BITS, &expected).ok()?;
         for _ in 0..HEIGHT {
             let Some(row) = read_row(&mut pictures, sensor) else { return Some(()) };
-            let begin = timer.ticks();
+            let begin = ticks();
             stream.push_row(row.get(..usize::from(sensor.camera().width()))?).ok()?;
-            *taking = taking.wrapping_add(timer.ticks().wrapping_sub(begin));
+            *taking = taking.wrapping_add(ticks().wrapping_sub(begin));
         }
-        let begin = timer.ticks();
+        let begin = ticks();
         let report = stream.finish(lists, &Unobserved);
-        *ending = timer.ticks().wrapping_sub(begin);
+        *ending = ticks().wrapping_sub(begin);
         level = report.next_level;
         *status = report.status as u32;
         if let Some(solution) = &report.solution {

@@ -1,0 +1,36 @@
+//! The sensor of an array of 160×120 pixels; [`hzn_firmware::array`] describes the files.
+
+#![no_std]
+#![no_main]
+
+use hzn_core::SensorPlace;
+use hzn_core::pipeline::{ROWS_HELD, RowBuffers, Workspace};
+use hzn_firmware::array;
+use hzn_firmware::host::exit;
+use hzn_virt::{instructions, take_page};
+use static_cell::ConstStaticCell;
+
+const WIDTH: usize = 160;
+const HEIGHT: usize = 120;
+/// Has room for 320 border pixels of all edges, and for 512 changes between dark and lit.
+type Rows = RowBuffers<u16, { ROWS_HELD as usize * WIDTH }, HEIGHT, 512, 320>;
+/// Has room for 160 points of an edge.
+type Lists = Workspace<f32, 320, 20, 160>;
+
+static SENSOR: ConstStaticCell<SensorPlace<f32>> = ConstStaticCell::new(SensorPlace::empty());
+static ROWS: ConstStaticCell<Rows> = ConstStaticCell::new(Rows::new());
+static LISTS: ConstStaticCell<Lists> = ConstStaticCell::new(Lists::new());
+
+/// The start-up code calls it.
+// SAFETY: no other function of the image has this name.
+#[unsafe(no_mangle)]
+extern "C" fn main() -> ! {
+    exit(match run() {
+        Some(()) => 0,
+        None => 1,
+    })
+}
+
+fn run() -> Option<()> {
+    array::run(take_page()?, instructions, SENSOR.try_take()?, ROWS.try_take()?, LISTS.try_take()?)
+}
