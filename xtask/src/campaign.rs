@@ -5,9 +5,10 @@ use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use crate::firmware;
-use crate::machine::{root, target};
+use crate::machine::{self, root, target};
 use crate::steps::{self, Outcome, Trouble, cargo};
 use crate::{miri, mutants, parts, processors, python, wheel};
 
@@ -26,11 +27,13 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
        cargo xtask campaign cuts [PICTURES]
        cargo xtask campaign flights [FLIGHTS]
        cargo xtask campaign long [PICTURES]
+       cargo xtask campaign fly [PICTURES]
        cargo xtask campaign flips [TRIALS]
        cargo xtask campaign packets [COUNT]
        cargo xtask campaign pictures [FLIGHTS]
        cargo xtask campaign integrity [PICTURES [SEED [STATE]...]]
        cargo xtask campaign night [PICTURES [SEED]]
+       cargo xtask campaign means [FLIGHTS [SEED]]
        cargo xtask campaign rig [ATTITUDES [FLIGHTS]]
        cargo xtask campaign miri
        cargo xtask campaign paths
@@ -45,6 +48,8 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
   cuts  cuts the power after each step of runs of PICTURES (12) pictures
   flights
         fuses FLIGHTS (200) right flights, and every wrong input on a twentieth of them
+  fly   gives PICTURES (36000) pictures of 1920x1080 to hzn fly, 60 a second, with a real-time priority where the machine
+        allows it, and prints the time from the last byte of a picture to its packet
   long  processes PICTURES (100000) with hzn run, and ten times as many in one process
   flips flips TRIALS (20000) bits of pictures and of stored parameters, sticks as many pictures, and flips every bit
         of a sensor in memory
@@ -57,6 +62,8 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
         of its own, from SEED (700000) on, and counts errors above protection_deg
   night renders PICTURES (300) pictures of layers of airglow of each kind, from SEED (810000) on, and as many limbs by
         day with a wrong time and edges that are no limb, and counts the answers of body.night = \"airglow\"
+  means simulates FLIGHTS (20) flights of 100 pictures in ten seconds, of each of five scenes, from SEED (910000) on, and
+        prints the NEES of means of 3, 10 and 100 answers, and the errors beside those of the preset dlr-2022
   rig   counts the errors of the coarse direction of a rig from ATTITUDES (1000) random attitudes, and those of the
         mounts that hzn calibrate rig finds on FLIGHTS (300) flights
   miri  runs the tests of the flight software and of the C interface in Miri
@@ -86,6 +93,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         Some("kill") => kill(number(1000)?).map_err(Trouble::into_message),
         Some("cuts") => cuts(number(12)?).map_err(Trouble::into_message),
         Some("flights") => flights(number(200)?).map_err(Trouble::into_message),
+        Some("fly") => fly(number(36_000)?).map_err(Trouble::into_message),
         Some("long") => long(number(100_000)?).map_err(Trouble::into_message),
         Some("flips") => flips(number(20_000)?).map_err(Trouble::into_message),
         Some("packets") => packets(number(1_000_000)?).map_err(Trouble::into_message),
@@ -95,6 +103,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
             integrity(number(200)?, number_at(2, 700_000)?, states).map_err(Trouble::into_message)
         }
         Some("night") => night(number(300)?, number_at(2, 810_000)?).map_err(Trouble::into_message),
+        Some("means") => means(number(20)?, number_at(2, 910_000)?).map_err(Trouble::into_message),
         Some("rig") => rig(number(1000)?, number_at(2, 300)?).map_err(Trouble::into_message),
         Some("processors") => processors::compare(number(2000)?).map_err(Trouble::into_message),
         Some("miri") => miri::campaign().map_err(Trouble::into_message),
@@ -121,6 +130,18 @@ pub(crate) fn kill(runs: u64) -> Outcome {
 fn long(pictures: u64) -> Outcome {
     steps::run(test("core", "the_answers_repeat").env("HZN_FRAMES", (10 * pictures).to_string()))?;
     steps::run(test("cli", "campaign::a_long_run").env("HZN_PICTURES", pictures.to_string()))
+}
+
+/// Flies with pictures that come in real time.
+fn fly(pictures: u64) -> Outcome {
+    let mut campaign = test("cli", "fly_long::");
+    campaign.env("HZN_FLY_PICTURES", pictures.to_string());
+    if machine::run_within(Command::new("chrt").args(["-f", "50", "true"]), Duration::from_secs(5)) {
+        campaign.env("HZN_FLY_PRIORITY", "50");
+    } else {
+        println!("this machine allows no real-time priority: the times are those of the usual one");
+    }
+    steps::run(&mut campaign)
 }
 
 pub(crate) fn flips(trials: u64) -> Outcome {
@@ -190,6 +211,13 @@ fn night(pictures: u64, first_seed: u64) -> Outcome {
     steps::run(&mut cargo(&["build", "--release", "--bin", "hzn"]))?;
     let mut campaign = python_campaign("tests/python/night_campaign.py", &target().join("release/hzn"))?;
     steps::run(campaign.args(["--list", "--pictures", &pictures.to_string(), "--first-seed", &first_seed.to_string()]))
+}
+
+/// Compares the errors of means of many answers with what is common to them.
+fn means(flights: u64, first_seed: u64) -> Outcome {
+    steps::run(&mut cargo(&["build", "--release", "--bin", "hzn"]))?;
+    let mut campaign = python_campaign("tests/python/means_campaign.py", &target().join("release/hzn"))?;
+    steps::run(campaign.args(["--flights", &flights.to_string(), "--first-seed", &first_seed.to_string()]))
 }
 
 /// Returns the call of the campaign on pictures of another program.

@@ -6,6 +6,8 @@
 //! A comparison costs less than a checksum. It needs the memory of the second copy.
 
 #![no_std]
+// These processors (LEON, for example) have assembly only in a nightly compiler, which they need in any case.
+#![cfg_attr(any(target_arch = "sparc", target_arch = "xtensa"), feature(asm_experimental_arch))]
 
 use core::mem::MaybeUninit;
 

@@ -21,26 +21,26 @@ const PERIOD: Duration = Duration::from_micros(33_333);
 const NOT_ANSWER: [&str; 5] = ["index", "file", "time_s", "elapsed_us", "crc32"];
 
 /// A program that runs beside the test. Its messages come line by line.
-struct Running {
+pub(crate) struct Running {
     child: Child,
     lines: Receiver<String>,
     said: Vec<String>,
 }
 
 impl Running {
-    fn start(mut command: Command) -> Self {
+    pub(crate) fn start(mut command: Command) -> Self {
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let (sender, lines) = channel();
         let from = BufReader::new(child.stderr.take().unwrap());
         std::thread::spawn(move || from.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
         Self { child, lines, said: Vec::new() }
     }
-    fn stdin(&mut self) -> ChildStdin {
+    pub(crate) fn stdin(&mut self) -> ChildStdin {
         self.child.stdin.take().unwrap()
     }
     /// Waits until the program says this.
     #[track_caller]
-    fn wait_for(&mut self, text: &str) {
+    pub(crate) fn wait_for(&mut self, text: &str) {
         let end = Instant::now() + Duration::from_secs(20);
         while !self.said.iter().any(|line| line.contains(text)) {
             let left = end.saturating_duration_since(Instant::now());
@@ -48,11 +48,11 @@ impl Running {
             self.said.push(line);
         }
     }
-    fn signal(&self, signal: Signal) {
+    pub(crate) fn signal(&self, signal: Signal) {
         kill(Pid::from_raw(self.child.id() as i32), signal).unwrap();
     }
     /// Waits for the end. Returns the exit code and everything that was said.
-    fn end(mut self) -> (Option<i32>, String) {
+    pub(crate) fn end(mut self) -> (Option<i32>, String) {
         let code = self.child.wait().unwrap().code();
         self.said.extend(self.lines.iter());
         (code, self.said.join("\n"))
@@ -66,7 +66,7 @@ impl Drop for Running {
     }
 }
 
-fn free_port() -> u16 {
+pub(crate) fn free_port() -> u16 {
     TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 

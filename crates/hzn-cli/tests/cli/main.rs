@@ -23,6 +23,7 @@ mod doubts;
 mod evaluate;
 mod faults;
 mod fly;
+mod fly_long;
 mod fly_rig;
 mod fuse;
 mod fuse_points;
