@@ -23,6 +23,18 @@ pub(crate) fn result(text: impl Display) -> io::Result<()> {
     bytes(lines(text).as_bytes())
 }
 
+/// Prints a report beside which a command writes files or decides its exit code. A reader that has read enough
+/// (`hzn calibrate sky ... | head`) must not cost them, so the work then goes on.
+///
+/// # Errors
+/// The disk of stdout is full.
+pub(crate) fn report(text: impl Display) -> io::Result<()> {
+    match result(text) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        done => done,
+    }
+}
+
 /// Prints the content of a file to stdout. It stays as it is, unless stdout is a terminal.
 ///
 /// # Errors

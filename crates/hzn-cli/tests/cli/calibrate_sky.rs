@@ -65,7 +65,7 @@ attitude_sigma_deg = 0.005
 /// is `percent` too long.
 fn render(place: &Place, scene: &str, percent: f64, body: &str) {
     place.write("scene.toml", scene.as_bytes());
-    place.run(&["simulate", "scene.toml", "-o", "flight", "-q"]).expect(0);
+    place.run(&["simulate", "scene.toml", "-o", "flight", "-q", "--no-noise"]).expect(0);
     let camera = scene.split("[camera]").nth(1).unwrap().split("\n[").next().unwrap();
     let focal: f64 = camera.split("fx_px = ").nth(1).unwrap().split_whitespace().next().unwrap().parse().unwrap();
     let old = format!("f{{}}_px = {focal:.1}");
@@ -97,6 +97,12 @@ fn the_lens_comes_from_the_limb_and_is_checked() {
     assert!(sigma < 6.0 && (focal - 240.0).abs() < 3.0 * sigma, "{}", ran.out);
     assert!(place.read("new.html").contains("<svg"));
     assert_provenance(&place.read("new.html"), true, "hzn calibrate sky");
+    // A reader that stops reading the report costs no file.
+    let mut piped = place.command(&[&sky[..], &["-o", "piped.toml"]].concat());
+    let mut piped = piped.stdout(std::process::Stdio::piped()).spawn().unwrap();
+    drop(piped.stdout.take());
+    assert_eq!(piped.wait().unwrap().code(), Some(0));
+    assert_eq!(value(&place.read("piped.toml"), "fx_px"), focal);
     // The file works, and the calibration that it holds is not rejected by the flight.
     place.run(&["camera", "show", "new.toml"]).expect(0);
     let check = place.run(&["calibrate", "check", "flight", "-s", "new.toml", "-q"]).expect(0);
@@ -157,4 +163,43 @@ fn the_lens_comes_from_the_sun() {
         .run(&[&sky[..], &["--frames", "none.csv"]].concat())
         .expect(1)
         .says("0 pictures have an answer and a direction");
+}
+
+/// Returns the number after a word of the report and the one behind its ±.
+fn number(report: &str, after: &str) -> [f64; 2] {
+    let mut words = report.split(after).nth(1).unwrap().split_whitespace();
+    let mut next = || words.find_map(|word| word.parse().ok()).unwrap();
+    [next(), next()]
+}
+
+/// One after the other, limb and Sun are one adjustment, because the covariance of the lens goes from one to the other.
+/// The lens of both is that of the Sun, in either order, and with it the limb gives a better height.
+#[test]
+fn limb_and_sun_follow_each_other() {
+    let place = Place::new();
+    let camera = FLIGHT.split("[camera]").nth(1).unwrap().split("\n[").next().unwrap();
+    let own = SUN.split("[camera]").nth(1).unwrap().split("\n[").next().unwrap();
+    let sun = SUN.replace(own, camera).replace("wander_deg = 4.0", "wander_deg = 25.0");
+    let known = "focal_sigma_percent = 5.0\ncentre_sigma_px = 8.0\n";
+    render(&place, &sun, 3.0, known);
+    std::fs::rename(place.path("flight"), place.path("sun")).unwrap();
+    render(&place, &FLIGHT.replace("frames = 20", "frames = 40"), 3.0, known);
+    let of_sun = |text: &str| format!("{text}\n[body]\nkind = \"sun\"\n");
+    let sky =
+        |pictures: &str, from: &str, to: &str| place.run(&["calibrate", "sky", pictures, "-s", from, "-q", "-o", to]);
+    place.write("mine-sun.toml", of_sun(&place.read("mine.toml")).as_bytes());
+    sky("sun", "mine-sun.toml", "by-sun.toml").expect(0);
+    let alone = sky("flight", "mine.toml", "by-limb.toml").expect(0);
+    place.write("by-limb-sun.toml", of_sun(&place.read("by-limb.toml")).as_bytes());
+    let both = sky("sun", "by-limb-sun.toml", "by-both.toml").expect(0);
+    let [_, sigma_px] = number(&both.out, "fx_px          ");
+    for key in ["fx_px", "cx_px", "cy_px"] {
+        let [first, last] = ["by-sun.toml", "by-both.toml"].map(|file| value(&place.read(file), key));
+        assert!((first - last).abs() < 0.5 * sigma_px, "{key}: {first} {last}");
+    }
+    // The limb cannot halve the sigmas that the Sun has left, so nothing is written; the report has the height.
+    place.write("by-sun-limb.toml", place.read("by-sun.toml").replace("kind = \"sun\"", "").as_bytes());
+    let after = sky("flight", "by-sun-limb.toml", "no.toml").expect(1);
+    let [[_, before_km], [_, after_km]] = [&alone.out, &after.out].map(|report| number(report, "limb height    "));
+    assert!(after_km < 0.7 * before_km, "{before_km} {after_km}");
 }

@@ -64,6 +64,6 @@ pub(super) fn run(args: &Args) -> Outcome {
     let camera = &sensor.config.camera;
     let check = sky::check(camera, &found.plan.config.body, &found.views, limb, args.detect_percent)
         .map_err(|why| failed(format!("{input}: of {}: {why}", counted(found.count, "picture"))))?;
-    tell::result(sky_text::check_report(&check, found.count))?;
+    tell::report(sky_text::check_report(&check, found.count))?;
     Ok(found.unread.exit(if check.verdict == Verdict::DoesNotHold { Exit::Failed } else { Exit::Done }))
 }

@@ -45,7 +45,7 @@ pub(super) fn write_all(
         };
         files.push((path, text));
     }
-    tell::result(lens_text::report(calibrated, reasons))?;
+    tell::report(lens_text::report(calibrated, reasons))?;
     calibrated.warnings.iter().for_each(tell::warning);
     for (path, text) in files {
         disk::write_whole(path, &text)?;

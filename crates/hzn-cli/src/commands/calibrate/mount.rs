@@ -277,7 +277,7 @@ fn of_board(
     }
     let found = board::mount(camera, &board, &tilts, bias_mg * 1e-3)
         .map_err(|why| failed(format!("no mount is written: {why}")))?;
-    tell::result(report(&found))?;
+    tell::report(report(&found))?;
     let what = "compare the line `axes` with the vehicle: accelerations with two axes exchanged, or with one wrong \
                 sign, leave the same residuals, and the mount is then wrong by half a turn";
     tell::line(format_args!("note: {what}"));
@@ -333,7 +333,7 @@ impl OutputArgs {
         let sigma = format!("1 sigma about the camera's x, y, z axes: {x:.4}, {y:.4}, {z:.4} deg");
         let mount = format!("[mount]\nq_vehicle_from_camera_wxyz = [{wxyz}]\n");
         let fuse = self.settings(found);
-        tell::result(format_args!("{mount}# {sigma}\n\n{fuse}"))?;
+        tell::report(format_args!("{mount}# {sigma}\n\n{fuse}"))?;
         if let (Some(clock_s), name) = (found.clock_s, &self.name) {
             tell::line(format_args!("note: the clock goes to the command:  hzn fuse --clock {name}={clock_s:.6} ..."));
         }

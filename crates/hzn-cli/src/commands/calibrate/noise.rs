@@ -76,7 +76,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         .map_err(|why| failed(format!("{input} ({}): {why}", explain::counted(pictures, "picture"))))?;
     calibration.compare_with(&sensor.config);
     let written = noise::into_sensor_toml(&sensor.text, &calibration, &input).map_err(failed)?;
-    tell::result(text::report(&calibration, pictures, &plan.config.camera))?;
+    tell::report(text::report(&calibration, pictures, &plan.config.camera))?;
     for path in args.output.iter().filter(|p| ending(p) == "html") {
         let html = page::html(&calibration, pictures, &input, &plan.config)?;
         disk::write(path, html)?;
@@ -84,7 +84,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(alarm) = calibration.alarm() {
         return Err(failed(format!("{input}: no sensor.toml is written: {alarm}")));
     }
-    tell::result(format_args!("\n{}\n", written.keys.join("\n")))?;
+    tell::report(format_args!("\n{}\n", written.keys.join("\n")))?;
     let sensors: Vec<_> = args.output.iter().filter(|p| ending(p) == "toml").collect();
     for path in &sensors {
         disk::write(path, &written.text)?;

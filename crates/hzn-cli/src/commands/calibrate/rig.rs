@@ -96,7 +96,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         let checked = check(&adjusted, &told_rad2);
         // The joint answer compares the heads with the told mounts, too, and may refuse what the turns leave open.
         let refused = found.contradictions.describe(false_alarm);
-        tell::result(rig_text::check_report(
+        tell::report(rig_text::check_report(
             &names,
             &adjusted,
             (&checked, &noticed(&adjusted, &told_rad2)),
@@ -105,7 +105,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         let holds = matches!(checked, Check::Holds(_)) && refused.is_none();
         return Ok(if holds { Exit::Done } else { Exit::Failed });
     }
-    tell::result(rig_text::report(&names, &adjusted))?;
+    tell::report(rig_text::report(&names, &adjusted))?;
     if let Some(why) = rig_text::contradicts_told(&names, &check(&adjusted, &found.limbs.told_rad2())) {
         tell::warning(why);
     }

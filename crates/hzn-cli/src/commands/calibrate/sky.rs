@@ -59,7 +59,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Ok(Exit::Interrupted);
     };
     let mount = args.mount.then(|| sky::estimate_mount(&estimate, &pictures.plan.config.body, &pictures.views));
-    tell::result(sky_text::report(&estimate, pictures.count, mount.as_ref()))?;
+    tell::report(sky_text::report(&estimate, pictures.count, mount.as_ref()))?;
     Ok(pictures.unread.exit(write(args, &sensor, &estimate, mount, &input)?))
 }
 

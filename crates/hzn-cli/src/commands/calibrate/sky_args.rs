@@ -90,7 +90,7 @@ pub(super) fn unknowns(args: &Args, sensor: &Sensor) -> Unknowns {
 
 /// Prints the keys, and writes the copies of the sensor.toml.
 pub(super) fn write_sensors(args: &Args, written: &Written) -> Outcome {
-    tell::result(format_args!("\n{}\n", written.keys.join("\n")))?;
+    tell::report(format_args!("\n{}\n", written.keys.join("\n")))?;
     let sensors: Vec<_> = args.output.iter().filter(|p| ending(p) == "toml").collect();
     for path in &sensors {
         disk::write_whole(path, &written.text)?;

@@ -54,7 +54,7 @@ pub(super) fn run(args: &Args, sensor: &Sensor) -> Outcome {
     let track =
         sky::estimate_track(&unknowns, &sights).map_err(|why| failed(format!("{input}: of {pictures}: {why}")))?;
     let lines = hzn_calib::sky::track_lines(&track, &pictures);
-    tell::result(sky_text::join(&lines))?;
+    tell::report(sky_text::join(&lines))?;
     for path in args.output.iter().filter(|p| ending(p) == "html") {
         let title = format!("Lens from the track of Sun or Moon: {input}");
         hzn_run::disk::write_whole(path, &page::simple(&title, &lines, &[], &sensor.config)?)?;

@@ -114,7 +114,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if args.json {
         tell::file(serde_json::to_string_pretty(&report).map_err(failed)? + "\n")?;
     } else {
-        tell::result(text::report(&report, &worst))?;
+        tell::report(text::report(&report, &worst))?;
     }
     lost.iter().for_each(tell::warning);
     Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })

@@ -70,7 +70,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     summary::print(&fused, truth.as_deref())?;
     verdict(args, &fused, &outputs);
     let written: Vec<String> = written.iter().map(one_line).collect();
-    tell::result(format_args!("\n{}\n", written.join("\n")))?;
+    tell::report(format_args!("\n{}\n", written.join("\n")))?;
     let lost: Vec<_> = inputs.recordings.iter().filter_map(|recording| recording.lost.as_ref()).collect();
     lost.iter().for_each(tell::warning);
     Ok(match (fused.verdict.level(), lost.is_empty()) {

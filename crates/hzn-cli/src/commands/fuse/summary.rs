@@ -14,7 +14,7 @@ use crate::tell::{self, one_line};
 /// Prints what happened.
 pub(super) fn print(fused: &Fused, truth: Option<&[VehicleRow]>) -> Result<(), Stop> {
     for (name, value) in lines(fused, truth) {
-        tell::result(format_args!("{:<22} {}\n", one_line(name), one_line(value)))?;
+        tell::report(format_args!("{:<22} {}\n", one_line(name), one_line(value)))?;
     }
     for note in &fused.notes {
         tell::line(format_args!("note: {note}"));
