@@ -47,9 +47,14 @@ impl Noise {
         self.random = self.random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         self.random >> 33
     }
-    fn add(&mut self, picture: &[u8]) -> Vec<u8> {
+    /// Writes the picture with noise into `noisy`. Words of eight pixels are fast enough for a picture in a 60th of a
+    /// second.
+    fn add(&mut self, picture: &[u8], noisy: &mut [u8]) {
         let from = self.next() as usize % picture.len();
-        picture.iter().zip(&self.bits[from..]).map(|(pixel, bit)| pixel ^ bit).collect()
+        let words = picture.as_chunks::<8>().0.iter().zip(self.bits[from..].as_chunks::<8>().0);
+        for (to, (pixels, bits)) in noisy.as_chunks_mut::<8>().0.iter_mut().zip(words) {
+            *to = (u64::from_ne_bytes(*pixels) ^ u64::from_ne_bytes(*bits)).to_ne_bytes();
+        }
     }
 }
 
@@ -79,12 +84,12 @@ fn a_flight_of_many_pictures_tells_no_fault() {
     ground.wait_for("report: done");
     let mut pipe = flight.stdin();
     let (begin, mut before, mut longest) = (Instant::now(), Instant::now(), Duration::ZERO);
-    let mut noise = Noise::new(pictures[0].len());
+    let (mut noise, mut noisy) = (Noise::new(pictures[0].len()), pictures[0].clone());
     for (number, picture) in pictures.iter().cycle().take(count).enumerate() {
-        let picture = noise.add(picture);
+        noise.add(picture, &mut noisy);
         let due = begin + PERIOD * number as u32 + Duration::from_micros(noise.next() % JITTER_US);
         std::thread::sleep(due.saturating_duration_since(Instant::now()));
-        pipe.write_all(&picture).unwrap();
+        pipe.write_all(&noisy).unwrap();
         longest = longest.max(before.elapsed());
         before = Instant::now();
     }
