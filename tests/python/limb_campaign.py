@@ -36,6 +36,8 @@ SENSORS = {
     "with the Sun": (POSITION + SUN, "sunlit = true\n"),
     "with both": (POSITION + ATTITUDE + SUN, "sunlit = true\n"),
 }
+# The recipe of a published system, which gets what the sensor "default" gets.
+RECIPE = "dlr-2022"
 
 
 def answers(hzn, folder, sensor):
@@ -43,9 +45,9 @@ def answers(hzn, folder, sensor):
     return process(hzn, folder, *SENSORS[sensor])
 
 
-def process(hzn, folder, columns, lines, table="frames.csv"):
+def process(hzn, folder, columns, lines, table="frames.csv", first=""):
     """Runs hzn with these columns of a table and these further lines of sensor.toml. Returns the rows of its results."""
-    (folder / "used.toml").write_text((folder / "sensor.toml").read_text() + lines)
+    (folder / "used.toml").write_text(first + (folder / "sensor.toml").read_text() + lines)
     with (folder / table).open() as file:
         rows = list(csv.DictReader(file))
     with (folder / "used.csv").open("w", newline="") as file:
@@ -85,7 +87,18 @@ def fly(hzn, root, kind, seed):
             axis, limb_px = truth[pathlib.Path(row["file"]).name]
             found = miss(row, axis) if row["status"] == "ok" else None
             results[sensor].append((f"{folder.name}/{pathlib.Path(row['file']).name}", limb_px >= LEAST_LIMB_PX, found))
+    results[RECIPE] = recipe(hzn, folder, truth, results["default"])
     return kind, results
+
+
+def recipe(hzn, folder, truth, found):
+    """Returns the errors of hzn and of the published recipe, in degrees, on pictures with a limb that both answer."""
+    pairs = []
+    rows = process(hzn, folder, POSITION, "", first=f'preset = "{RECIPE}"\n')
+    for row, (_, lit, answer) in zip(rows, found, strict=True):
+        if lit and answer and row["status"] == "ok":
+            pairs.append((answer[0], miss(row, truth[pathlib.Path(row["file"]).name][0])[0]))
+    return pairs
 
 
 def table(flown):
@@ -100,6 +113,16 @@ def table(flown):
             print(f"| {kind} | {sensor} | {len(limbs)} | {sum(row[2] is not None for row in limbs)} "
                   f"| {sum(row[2] is not None for row in rows if not row[1])} | {np.median(errors):.3f}° "
                   f"| {squares.mean():.2f} | {(squares > BEYOND_3).sum()} | {(squares > BEYOND_5).sum()} |")
+
+
+def compare_with_recipe(flown):
+    print(f"\n| pictures | answered by both | hzn: RMS, median | {RECIPE}: RMS, median |\n|---|---:|---:|---:|")
+    for kind in limb_pictures.CLASSES:
+        pairs = np.array([pair for k, results in flown if k == kind for pair in results[RECIPE]]).reshape(-1, 2)
+        if len(pairs):
+            rms, median = np.sqrt((pairs**2).mean(axis=0)), np.median(pairs, axis=0)
+            cells = " | ".join(f"{rms[i]:.3f}°, {median[i]:.3f}°" for i in (0, 1))
+            print(f"| {kind} | {len(pairs)} | {cells} |")
 
 
 def main():
@@ -118,10 +141,11 @@ def main():
         flights = [pool.submit(fly, hzn, root, kind, seed) for kind in limb_pictures.CLASSES for seed in seeds]
         flown = [flight.result() for flight in flights]
     table(flown)
+    compare_with_recipe(flown)
     if options.list:
         for kind, results in flown:
-            for sensor, rows in results.items():
-                for name, lit, found in rows:
+            for sensor in SENSORS:
+                for name, lit, found in results[sensor]:
                     if found and found[1] > BEYOND_3:
                         print(f"{name}  {sensor}: {found[0]:.3f} deg, squared error {found[1]:.1f}")
     if options.check:
