@@ -35,6 +35,7 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
        cargo xtask campaign night [PICTURES [SEED]]
        cargo xtask campaign means [FLIGHTS [SEED]]
        cargo xtask campaign rig [ATTITUDES [FLIGHTS]]
+       cargo xtask campaign check [FLIGHTS [SEED]]
        cargo xtask campaign miri
        cargo xtask campaign paths
        cargo xtask campaign processors [PICTURES]
@@ -66,6 +67,8 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
         prints the NEES of means of 3, 10 and 100 answers, and the errors beside those of the preset dlr-2022
   rig   counts the errors of the coarse direction of a rig from ATTITUDES (1000) random attitudes, and those of the
         mounts that hzn calibrate rig finds on FLIGHTS (300) flights
+  check renders FLIGHTS (100) small flights of four kinds from SEED (910000) on, and counts what hzn calibrate check
+        says of the right lens, and of focal lengths that are 0.3, 1 and 3 % wrong
   miri  runs the tests of the flight software and of the C interface in Miri
   paths builds the images of the flight computer and the wheel in another folder; their bytes must be the same
   processors
@@ -105,6 +108,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
         Some("night") => night(number(300)?, number_at(2, 810_000)?).map_err(Trouble::into_message),
         Some("means") => means(number(20)?, number_at(2, 910_000)?).map_err(Trouble::into_message),
         Some("rig") => rig(number(1000)?, number_at(2, 300)?).map_err(Trouble::into_message),
+        Some("check") => check(number(100)?, number_at(2, 910_000)?).map_err(Trouble::into_message),
         Some("processors") => processors::compare(number(2000)?).map_err(Trouble::into_message),
         Some("miri") => miri::campaign().map_err(Trouble::into_message),
         Some("paths") => paths().map_err(Trouble::into_message),
@@ -164,6 +168,12 @@ pub(crate) fn flights(count: u64) -> Outcome {
 fn rig(attitudes: u64, flights: u64) -> Outcome {
     let mut campaign = test("cli", "rig_campaign::");
     steps::run(campaign.env("HZN_ATTITUDES", attitudes.to_string()).env("HZN_RIG_FLIGHTS", flights.to_string()))
+}
+
+/// Counts what `hzn calibrate check` says of right and of wrong lenses.
+pub(crate) fn check(flights: u64, first_seed: u64) -> Outcome {
+    let mut campaign = test("cli", "check_campaign::");
+    steps::run(campaign.env("HZN_CHECKS", flights.to_string()).env("HZN_SEED", first_seed.to_string()))
 }
 
 /// Cuts the power after each step of runs of so many pictures.

@@ -54,7 +54,7 @@ pub(crate) fn has_air(body: &body::Config) -> bool {
 }
 
 /// Returns the limb height and its 1-sigma that a sensor assumes for a body, in kilometres.
-fn unmeasured(body: &body::Config) -> [f64; 2] {
+pub(crate) fn unmeasured(body: &body::Config) -> [f64; 2] {
     let unmeasured = body::Config::of_kind(body.kind, body.radii_km);
     [unmeasured.limb_height_km, unmeasured.limb_height_sigma_km]
 }

@@ -215,6 +215,19 @@ impl Geometry {
         (geometry.sin_expected < 1.0 && geometry.sin_expected > 0.0).then_some(geometry)
     }
 
+    /// Returns the mean along the limb of sin φ and of (3 sin² φ − 1)/2, with the latitude φ of the limb; `None`
+    /// without a position. At the azimuth ψ from north, sin φ = u + w cos ψ with u = s sin φ₀, w = √(1 − s²) cos φ₀, s
+    /// = R/d and the latitude φ₀ of the position. A fit of axis and half-angle takes the part with cos ψ as a tilt,
+    /// whatever part of the limb is visible, so that only the mean is left in the height.
+    pub(crate) fn limb_by_latitude(&self) -> Option<[f64; 2]> {
+        let [x, y, z] = self.position_m?;
+        let distance_m = x.hypot(y).hypot(z);
+        let s = f64::min(WGS84_A_M / distance_m, 1.0);
+        let up_z = z / distance_m;
+        let (u, w2) = (s * up_z, (1.0 - s * s) * (1.0 - up_z * up_z));
+        Some([u, 0.5 * (3.0 * (u * u + 0.5 * w2) - 1.0)])
+    }
+
     /// Returns the variance of the fitted cos α from the second harmonic of the limb. If north is unknown, the full
     /// harmonic is an error. With the sigma of an attitude (radians) only a part of it is.
     pub(crate) fn variance_of_harmonic(&self, cone: &Cone, attitude_sigma_rad: Option<f64>) -> f64 {

@@ -99,19 +99,18 @@ pub struct Check {
     /// What the flight makes observable.
     pub observability: Observability,
     /// Mean square of the pictures' deviations over their variances without the scatter; `None` for a single picture.
-    /// Pictures above [`Self::MAX_CHI2`] contradict each other: no lens explains them all.
+    /// Pictures above [`Self::max_chi2`] contradict each other: no lens explains them all.
     pub chi2: Option<f64>,
+    /// Largest mean square of pictures that agree: 2, and more for fewer than 25 pictures, as in [`super::estimate()`].
+    pub max_chi2: f64,
     /// Number of pictures that count, and of pictures whose limb height disagrees.
     pub pictures: [usize; 2],
 }
 
 impl Check {
-    /// Largest mean square without an alarm. It is the limit of [`super::estimate`], too.
-    pub const MAX_CHI2: f64 = super::estimate::MAX_CHI2;
-
     /// Returns the mean square of the deviations if the pictures contradict each other.
     pub fn contradiction(&self) -> Option<f64> {
-        self.chi2.filter(|chi2| *chi2 > Self::MAX_CHI2)
+        self.chi2.filter(|chi2| *chi2 > self.max_chi2)
     }
 }
 
@@ -143,7 +142,8 @@ pub fn check(
     let focal = Deviation::new(value, variance(&flown, &percent), variance(&claimed.covariance, &percent), freedom);
     let centre_px = test_centre(&claimed, &fit, &systematic, freedom).ok_or(Refusal::Singular)?;
     let chi2 = super::estimate::chi2(&fit);
-    let contradicts = chi2.is_some_and(|chi2| chi2 > Check::MAX_CHI2);
+    let max_chi2 = super::estimate::max_chi2(counted);
+    let contradicts = chi2.is_some_and(|chi2| chi2 > max_chi2);
     let verdict = if contradicts || focal.is_significant() || centre_px.iter().any(Deviation::is_significant) {
         Verdict::DoesNotHold
     } else if focal.detectable <= detect_percent {
@@ -160,6 +160,7 @@ pub fn check(
         height_km: [fit.solution.values[height], fit.solution.covariance[(height, height)].sqrt()],
         observability,
         chi2,
+        max_chi2,
         pictures: [counted, fit.pictures.len() - counted],
     })
 }

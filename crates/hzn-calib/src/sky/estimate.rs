@@ -14,9 +14,19 @@ use super::refusal::Refusal;
 use super::unknowns::Unknowns;
 use super::view::View;
 use crate::limb_prior::LimbPrior;
+use crate::quantile;
 
-/// Largest mean square of the deviations over their variances without an alarm.
-pub(super) const MAX_CHI2: f64 = 2.0;
+/// Largest mean square of the deviations over their variances without an alarm, for a flight of many pictures.
+const MAX_CHI2: f64 = 2.0;
+/// Sigmas of a one-sided probability of 0.27 %: a right flight of few pictures raises an alarm as rarely as another
+/// test with 3 sigmas does.
+const ALARM_SIGMAS: f64 = 2.78;
+
+/// Returns the largest mean square without an alarm for a number of pictures. It scatters more if they are few.
+pub(super) fn max_chi2(pictures: usize) -> f64 {
+    let freedom = pictures.saturating_sub(1).max(1);
+    MAX_CHI2.max(quantile::chi2(freedom, ALARM_SIGMAS) / freedom as f64)
+}
 
 /// One picture in the calibration.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,6 +66,8 @@ pub struct Estimate {
     pub shift_sigma_px: [f64; 2],
     /// Mean square of the pictures' deviations over their variances without the scatter; `None` for a single picture.
     pub chi2: Option<f64>,
+    /// Largest mean square without an alarm: 2, and more for fewer than 25 pictures.
+    pub max_chi2: f64,
     /// Focal length and limb height against what was known of them before the flight.
     pub conflict: Conflict,
     /// What the flight makes observable.
@@ -94,6 +106,7 @@ pub fn estimate(
         scatter_km: (fit.counted().len() >= MIN_PICTURES).then_some(fit.solution.scatter_km),
         shift_sigma_px: [fit.common_px[0], fit.solution.covariance[(shift, shift)].sqrt()],
         chi2: chi2(&fit),
+        max_chi2: max_chi2(fit.counted().len()),
         conflict,
         observability,
         pictures: pictures(&fit, views),
@@ -113,8 +126,8 @@ impl Estimate {
 
     /// Returns the alarm if the pictures do not agree with each other, or not with what was known before.
     pub fn alarm(&self) -> Option<Refusal> {
-        if let Some(chi2) = self.chi2.filter(|chi2| *chi2 > MAX_CHI2) {
-            return Some(Refusal::Alarm { chi2, max_chi2: MAX_CHI2 });
+        if let Some(chi2) = self.chi2.filter(|chi2| *chi2 > self.max_chi2) {
+            return Some(Refusal::Alarm { chi2, max_chi2: self.max_chi2 });
         }
         self.conflict.is_significant().then(|| Refusal::Conflict {
             conflict: self.conflict,

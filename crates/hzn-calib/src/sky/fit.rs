@@ -4,13 +4,13 @@ use hzn_core::body;
 use hzn_core::camera::{Camera, Config};
 use nalgebra::{DMatrix, DVector};
 
-use super::layout::Layout;
+use super::layout::{LATITUDE, Layout};
 use super::linear::{self, EdgeNoise, Model, Reduced};
 use super::refusal::Refusal;
 use super::system::{self, PriorEquations, Solution};
 use super::unknowns::Unknowns;
 use super::view::View;
-use crate::limb_prior::LimbPrior;
+use crate::limb_prior::{LimbPrior, unmeasured};
 use crate::noise::bend::common_bend_px;
 use crate::noise::sighting::Geometry;
 
@@ -41,6 +41,8 @@ pub(super) struct Fitted {
     /// Its place in the list of views.
     pub(super) view: usize,
     geometry: Geometry,
+    /// Change of its limb height by each coefficient of the latitude; the mean over all pictures is 0.
+    latitude: [f64; LATITUDE],
     noise: EdgeNoise,
     pub(super) reduced: Reduced,
     /// Limb height of this picture with the fitted lens, and its 1-sigma from edge noise, in kilometres.
@@ -56,6 +58,8 @@ pub(super) struct Fit {
     pub(super) solution: Solution,
     /// The limb height with its prior, in kilometres.
     pub(super) limb: LimbPrior,
+    /// 1-sigma of the limb height that is assumed for the body without a measurement, in kilometres.
+    air_km: f64,
     /// Sigmas of the common shapes, in pixels.
     pub(super) common_px: Vec<f64>,
     /// RMS distance of the edge points from the principal point, in pixels.
@@ -90,7 +94,7 @@ impl Fit {
     /// Solves the same pictures with another prior of the intrinsic parameters and of the limb height, and with the
     /// scatter of this fit.
     pub(super) fn solve_again(&self, lens: &DMatrix<f64>, limb: LimbPrior) -> Option<Solution> {
-        let prior = prior_equations(self.layout, lens, limb, &self.common_px)?;
+        let prior = prior_equations(self.layout, lens, limb, self.air_km, &self.common_px)?;
         system::solve(&self.counted(), &prior, self.solution.scatter_km)
     }
 
@@ -128,6 +132,7 @@ impl Fit {
 struct State {
     layout: Layout,
     limb: LimbPrior,
+    air_km: f64,
     changes: DVector<f64>,
     height_km: f64,
     pictures: Vec<Fitted>,
@@ -140,25 +145,31 @@ impl State {
         let changes = DVector::zeros(unknowns.list.len());
         let height_km = limb.km;
         let model = Model::new(&camera, &unknowns.before, unknowns, changes.clone(), height_km);
-        let picture = |(view, of): (usize, &View)| {
+        let measured = views.iter().enumerate().filter_map(|(view, of)| {
             let geometry = linear::geometry(body, of)?;
             let noise = linear::measure_noise(&model, &geometry, of)?;
-            let reduced = linear::reduce(&model, &geometry, of, noise)?;
-            Some(Fitted { view, geometry, noise, reduced, height_km: [f64::NAN; 2], counts: true })
-        };
-        let pictures: Vec<Fitted> = views.iter().enumerate().filter_map(picture).collect();
+            Some((view, of, geometry, noise))
+        });
+        let measured: Vec<_> = measured.collect();
+        let by_latitude = by_latitude(measured.iter().map(|(_, _, geometry, _)| geometry));
+        let pictures = measured.into_iter().zip(by_latitude).filter_map(|((view, of, geometry, noise), latitude)| {
+            let reduced = linear::reduce(&model, &geometry, latitude, of, noise)?;
+            Some(Fitted { view, geometry, latitude, noise, reduced, height_km: [f64::NAN; 2], counts: true })
+        });
+        let pictures: Vec<Fitted> = pictures.collect();
         if pictures.is_empty() || (pictures.len() < MIN_PICTURES && !limb.sigma_km.is_finite()) {
             return Err(Refusal::TooFew { answered: pictures.len(), min_pictures: MIN_PICTURES });
         }
         let used = pictures.iter().filter_map(|p| views.get(p.view));
         let distance_px = distance_px(&unknowns.before, used);
-        Ok(Self { layout: model.layout, limb, changes, height_km, pictures, distance_px })
+        let air_km = unmeasured(body)[1];
+        Ok(Self { layout: model.layout, limb, air_km, changes, height_km, pictures, distance_px })
     }
 
     fn solve(&mut self, unknowns: &Unknowns) -> Result<Fit, Refusal> {
         let counted: Vec<&Fitted> = self.pictures.iter().filter(|p| p.counts).collect();
         let common_px = common_sigmas_px(self.layout, &counted);
-        let prior = prior_equations(self.layout, &unknowns.covariance, self.limb, &common_px);
+        let prior = prior_equations(self.layout, &unknowns.covariance, self.limb, self.air_km, &common_px);
         let reduced: Vec<&Reduced> = counted.iter().map(|p| &p.reduced).collect();
         let solved = prior.and_then(|prior| {
             if reduced.len() < MIN_PICTURES {
@@ -174,6 +185,7 @@ impl State {
             pictures: self.pictures.clone(),
             solution,
             limb: self.limb,
+            air_km: self.air_km,
             common_px,
             distance_px: self.distance_px,
         })
@@ -215,7 +227,9 @@ impl State {
         let Ok(camera) = Camera::try_new(&config) else { return false };
         let model = Model::new(&camera, &config, unknowns, self.changes.clone(), self.height_km);
         let each = self.pictures.iter().map(|picture| {
-            views.get(picture.view).and_then(|view| linear::reduce(&model, &picture.geometry, view, picture.noise))
+            views
+                .get(picture.view)
+                .and_then(|view| linear::reduce(&model, &picture.geometry, picture.latitude, view, picture.noise))
         });
         let Some(reduced) = each.collect::<Option<Vec<_>>>() else { return false };
         for (picture, reduced) in self.pictures.iter_mut().zip(reduced) {
@@ -269,6 +283,18 @@ fn distance_px<'a>(lens: &Config, views: impl Iterator<Item = &'a View>) -> f64 
     (square / f64::max(total, 1e-12)).sqrt()
 }
 
+/// Returns the change of each picture's limb height by the coefficients of the latitude, without their means: the limb
+/// height is that of the middle of the flight. It is 0 for a picture without a position.
+fn by_latitude<'a>(pictures: impl Iterator<Item = &'a Geometry>) -> Vec<[f64; LATITUDE]> {
+    let each: Vec<_> = pictures.map(Geometry::limb_by_latitude).collect();
+    let known = each.iter().flatten().count().max(1) as f64;
+    let mean: [f64; LATITUDE] =
+        core::array::from_fn(|i| each.iter().flatten().map(|terms| terms[i]).sum::<f64>() / known);
+    each.iter()
+        .map(|terms| terms.map_or([0.0; LATITUDE], |terms| core::array::from_fn(|i| terms[i] - mean[i])))
+        .collect()
+}
+
 /// Returns the sigmas of the common shapes: for the shift the RMS of the residuals, for all others the common bend of
 /// their side ([`common_bend_px`]).
 fn common_sigmas_px(layout: Layout, pictures: &[&Fitted]) -> Vec<f64> {
@@ -286,7 +312,16 @@ fn common_sigmas_px(layout: Layout, pictures: &[&Fitted]) -> Vec<f64> {
 }
 
 /// Returns the prior of all unknowns; `None` if the covariance of the lens is singular.
-fn prior_equations(layout: Layout, lens: &DMatrix<f64>, limb: LimbPrior, common_px: &[f64]) -> Option<PriorEquations> {
+///
+/// The sigma of the limb height is that of a picture at any latitude, so that the coefficients of the latitude have it,
+/// too. If the height is free, they have that of the body's air, `air_km`: air differs over the latitude by no more.
+fn prior_equations(
+    layout: Layout,
+    lens: &DMatrix<f64>,
+    limb: LimbPrior,
+    air_km: f64,
+    common_px: &[f64],
+) -> Option<PriorEquations> {
     let mut prior = PriorEquations::new(layout.len());
     let sigma = limb.sigma_km.clamp(1e-6, FREE_KM);
     prior.add(Layout::HEIGHT, &DVector::from_element(1, limb.km), &DMatrix::from_element(1, 1, sigma * sigma))?;
@@ -295,5 +330,7 @@ fn prior_equations(layout: Layout, lens: &DMatrix<f64>, limb: LimbPrior, common_
         prior.add_zero(layout.first_common() + i, *sigma);
     }
     prior.add_zero(layout.radius(), 1.0);
+    let of_latitude = if limb.sigma_km.is_finite() { sigma } else { air_km.max(1e-6) };
+    (0..LATITUDE).for_each(|i| prior.add_zero(layout.latitude() + i, of_latitude));
     Some(prior)
 }

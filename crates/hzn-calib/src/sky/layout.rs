@@ -1,7 +1,8 @@
 //! The order of the unknowns in a vector.
 //!
 //! The first is the limb height in kilometres. The changes of the intrinsic parameters follow, then the common shift of
-//! all edges and their common shapes in pixels, and last the local radius in sigmas.
+//! all edges and their common shapes in pixels, the local radius in sigmas, and last how the limb height changes with
+//! the latitude, in kilometres.
 //!
 //! A limb is higher and brighter where the Sun is higher, so that its tilt, bend and further shapes change with the
 //! side of the Sun. With two sides, the edges with the Sun towards their end have shapes of their own.
@@ -10,6 +11,8 @@ use crate::noise::bend::{SHAPES, bend_shape, next_shapes};
 
 /// Number of shapes of an edge that all pictures may have in common: a shift, a tilt, a bend, and the next shapes.
 const COMMON: usize = 3 + SHAPES;
+/// Number of coefficients of the latitude.
+pub(super) const LATITUDE: usize = 2;
 
 /// The order of the unknowns for a number of intrinsic parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,9 +48,13 @@ impl Layout {
     pub(super) fn radius(self) -> usize {
         1 + self.intrinsics + self.common()
     }
+    /// Returns the index of the first coefficient of the latitude.
+    pub(super) fn latitude(self) -> usize {
+        self.radius() + 1
+    }
     /// Returns the number of unknowns.
     pub(super) fn len(self) -> usize {
-        2 + self.intrinsics + self.common()
+        self.latitude() + LATITUDE
     }
 }
 

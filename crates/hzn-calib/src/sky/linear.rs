@@ -19,7 +19,7 @@ use hzn_core::camera::{Camera, Config, Equation};
 use hzn_core::pixel::ImagePoint;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
 
-use super::layout::{Layout, common_shapes};
+use super::layout::{LATITUDE, Layout, common_shapes};
 use super::unknowns::Unknowns;
 use super::view::View;
 use crate::noise::bend::{SHAPES, shapes_px};
@@ -144,8 +144,15 @@ pub(super) fn measure_noise(model: &Model, geometry: &Geometry, view: &View) -> 
     noise.variance_px2.is_finite().then_some(noise)
 }
 
-/// Linearises a picture and eliminates its axis. The result is `None` if the points have no limb in this lens.
-pub(super) fn reduce(model: &Model, geometry: &Geometry, view: &View, noise: EdgeNoise) -> Option<Reduced> {
+/// Linearises a picture and eliminates its axis. `latitude` is the change of its limb height by each coefficient of the
+/// latitude. The result is `None` if the points have no limb in this lens.
+pub(super) fn reduce(
+    model: &Model,
+    geometry: &Geometry,
+    latitude: [f64; LATITUDE],
+    view: &View,
+    noise: EdgeNoise,
+) -> Option<Reduced> {
     let still = &model.camera.clone().with_temperature(view.prior.camera_temperature_c);
     let camera = &still.with_rate(view.prior.rate_rad_s);
     let points = locate(camera, view);
@@ -165,7 +172,7 @@ pub(super) fn reduce(model: &Model, geometry: &Geometry, view: &View, noise: Edg
     let limb = Limb { cos, by_height_km, azimuth: azimuth(geometry, view) };
     let axis = fit_axis(&points, Vector3::from(view.axis), &limb)?;
     let side = side_of_sun(view, &points);
-    let columns = Columns { model, still, camera, geometry, limb: &limb, axis, side };
+    let columns = Columns { model, still, camera, geometry, latitude, limb: &limb, axis, side };
     Some(eliminate_axis(&columns, &points, noise))
 }
 
@@ -224,6 +231,7 @@ struct Columns<'a> {
     still: &'a Camera<f64>,
     camera: &'a Camera<f64>,
     geometry: &'a Geometry,
+    latitude: [f64; LATITUDE],
     limb: &'a Limb,
     axis: Vector3<f64>,
     side: usize,
@@ -246,6 +254,9 @@ impl Columns<'_> {
         row[Layout::HEIGHT] = limb.by_height_km / g;
         // The local radius acts as a limb height of its own sigma.
         row[layout.radius()] = row[Layout::HEIGHT] * geometry.radius_sigma_m / 1e3;
+        for (i, by_coefficient) in self.latitude.into_iter().enumerate() {
+            row[layout.latitude() + i] = row[Layout::HEIGHT] * by_coefficient;
+        }
         for (i, place) in model.places.iter().enumerate() {
             let by = |axis: usize| projected.by_intrinsics[axis].get(*place).copied().unwrap_or(0.0);
             row[layout.first_intrinsic() + i] = edge[0] * by(0) + edge[1] * by(1);

@@ -2,7 +2,8 @@
 //!
 //! The pictures measure the intrinsic parameters of the lens jointly with the limb height. Each picture has an axis of
 //! its own, which is eliminated. The limb heights of the pictures scatter about one height; the scatter is estimated. A
-//! shift and a bend that all edges have in common are unknowns too, with priors from the residuals.
+//! shift and a bend that all edges have in common are unknowns too, with priors from the residuals, and so are two
+//! coefficients of the limb height's change with the latitude where the positions are known.
 //!
 //! ```text
 //! View (edge points, prior) ─► linear::reduce (axis eliminated, edge noise) ─► Reduced ─┐
@@ -17,6 +18,8 @@ mod check;
 mod conflict;
 mod estimate;
 mod fit;
+#[cfg(test)]
+mod latitude_tests;
 mod layout;
 mod linear;
 mod mount;

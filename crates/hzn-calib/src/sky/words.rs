@@ -3,7 +3,7 @@
 use hzn_core::camera::Intrinsic;
 
 use super::check::{Check, Deviation, Verdict};
-use super::estimate::{Estimate, MAX_CHI2, MIN_PICTURES};
+use super::estimate::{Estimate, MIN_PICTURES};
 use super::mount::{Mount, MountRefusal};
 use super::observable::Observability;
 use super::parameters::Determined;
@@ -127,8 +127,8 @@ fn add_limb(lines: &mut Lines, estimate: &Estimate) {
     lines
         .add("common shift", format!("of all edges: ± {before_px:.2} px assumed, ± {after_px:.2} px after the flight"));
     if let Some(chi2) = estimate.chi2 {
-        let [chi2, _] = above(chi2, MAX_CHI2);
-        lines.add("chi-square", format!("{chi2} a degree of freedom; 1 is ideal, a value above 2 is an alarm"));
+        let [chi2, limit] = above(chi2, estimate.max_chi2);
+        lines.add("chi-square", format!("{chi2} a degree of freedom; 1 is ideal, a value above {limit} is an alarm"));
     }
     let c = &estimate.conflict;
     let [chi2, limit] = above(c.chi2, c.max_chi2);
@@ -196,7 +196,7 @@ pub fn check_lines(check: &Check, pictures: &str) -> Vec<(String, String)> {
         lines.add(name, describe(deviation, "px"));
     }
     if let Some(chi2) = check.chi2 {
-        let [chi2, limit] = above(chi2, Check::MAX_CHI2);
+        let [chi2, limit] = above(chi2, check.max_chi2);
         lines.add(
             "chi-square",
             format!("{chi2} a degree of freedom; 1 is ideal; above {limit} the pictures contradict each other"),
@@ -231,7 +231,7 @@ fn significant(check: &Check) -> String {
     let [u, v] = &check.centre_px;
     let differs = [&check.focal, u, v].iter().any(|d| d.is_significant());
     if let Some(chi2) = check.contradiction().filter(|_| !differs) {
-        let [chi2, limit] = above(chi2, Check::MAX_CHI2);
+        let [chi2, limit] = above(chi2, check.max_chi2);
         return format!(
             "the pictures contradict each other: chi-square is {chi2} per degree of freedom, but at most {limit} is \
              consistent, so that no lens explains all of them. Possible reasons: a lens that focuses or zooms, a \

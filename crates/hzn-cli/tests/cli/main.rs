@@ -11,6 +11,7 @@ mod calibrate_sky;
 mod camera;
 mod campaign;
 mod ccsds;
+mod check_campaign;
 mod commands;
 mod common;
 mod conventions;
