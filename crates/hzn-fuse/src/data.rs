@@ -5,6 +5,7 @@ use hzn_nav::options::{CameraOptions, Options, StartSigmas};
 
 use crate::events::Event;
 use crate::input::{Inputs, Sample};
+use crate::quantised;
 use crate::settings::Settings;
 
 /// A flight with its data in order.
@@ -25,9 +26,12 @@ impl Flight<'_> {
         recordings.map(|(r, mount)| settings.camera_options(&r.name, *mount, r.bodies().len())).collect()
     }
 
-    /// Returns the options of the filter.
+    /// Returns the options of the filter. The noise of the gyros has that of their steps.
     pub(crate) fn options(&self, settings: &Settings, start: StartSigmas) -> Options {
         let limb_sigma_km = self.inputs.recordings.iter().filter_map(|r| r.limb_sigma_km).reduce(f64::max);
-        settings.options(limb_sigma_km, start)
+        let mut options = settings.options(limb_sigma_km, start);
+        let [_, rest] = &mut options.imu.gyro_noise;
+        *rest = rest.hypot(quantised::gyro_noise(self.samples));
+        options
     }
 }

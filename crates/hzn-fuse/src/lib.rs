@@ -25,6 +25,7 @@ pub mod finding;
 pub mod flight;
 pub mod input;
 mod orbit;
+mod quantised;
 pub mod read_back;
 mod reference;
 mod repeats;

@@ -127,7 +127,7 @@ fn limit(rows: &[Vector3<f64>], axis: usize, sign: f64) -> Option<Limit> {
 
 /// Returns the step of a channel, or more: the fifth smallest difference of its values, because some rows may be those
 /// of another source. The extreme values do not count: a limit may lie between two steps.
-fn step(values: &[f64]) -> Option<f64> {
+pub(crate) fn step(values: &[f64]) -> Option<f64> {
     let mut all = values.to_vec();
     all.sort_by(f64::total_cmp);
     all.dedup();

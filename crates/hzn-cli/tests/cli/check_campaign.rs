@@ -95,7 +95,7 @@ fn verdicts_over_right_and_wrong_lenses() {
         let folder = format!("flight/{camera}");
         let sensor = place.read(&format!("{folder}/sensor.toml"));
         for (count, percent) in counts[kind].iter_mut().zip(ERRORS_PERCENT) {
-            let sign = if flight / KINDS.len() as u64 % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if (flight / KINDS.len() as u64).is_multiple_of(2) { 1.0 } else { -1.0 };
             place.write("told.toml", with_focal(&sensor, sign * percent).as_bytes());
             let ran = place.run(&["calibrate", "check", &folder, "-s", "told.toml", "-q"]);
             if percent == 0.0 && (ran.code != 0 || !ran.err.is_empty()) {

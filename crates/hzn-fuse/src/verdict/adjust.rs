@@ -121,7 +121,9 @@ impl Problem {
         let clock_s = shared[s.clock(look.camera)] + shared[s.clocks()];
         let now = self.reckoning.at(look.time_s + clock_s).unwrap_or(look.integrals);
         let window = &self.windows[look.window];
-        let in_camera = (look.measured - look.by_height * shared[s.height()]).normalize();
+        let by_latitude = look.by_latitude.iter().enumerate().map(|(i, (height, _))| height * shared[s.latitude() + i]);
+        let height_km = shared[s.height()] + by_latitude.sum::<f64>();
+        let in_camera = (look.measured - look.by_height * height_km).normalize();
         let mount = look.mount * UnitQuaternion::from_scaled_axis(three(s.mount(look.camera)));
         let unit = UnitQuaternion::from_scaled_axis(three(s.unit()));
         let on_vehicle = unit * mount * in_camera;
@@ -131,10 +133,12 @@ impl Problem {
         (Sighted { direction: attitude * on_vehicle, on_vehicle, in_camera, attitude, mount: unit * mount }, now)
     }
 
-    /// Returns the reference of a direction at the UTC of the state.
+    /// Returns the reference of a direction at the UTC of the state and with its limb heights by latitude.
     pub(super) fn reference(&self, shared: &DVector<f64>, look: &Look) -> Vector3<f64> {
         let late_s = if look.is_celestial { shared[self.shared.utc()] } else { 0.0 };
-        super::problem::about_pole(late_s) * look.reference
+        let coefficients = look.by_latitude.iter().enumerate();
+        let tilt: Vector3<f64> = coefficients.map(|(i, (_, tilt))| tilt * shared[self.shared.latitude() + i]).sum();
+        super::problem::about_pole(late_s) * look.reference + tilt
     }
 
     /// Returns measured minus known direction, with its derivatives.
@@ -157,7 +161,11 @@ impl Problem {
         let by_drift = to_fixed.to_rotation_matrix().into_inner() * seen.direction.cross_matrix();
         three(&mut columns, first + s.bias(), &(by_drift * (now.by_bias - window.by_bias)));
         three(&mut columns, first + s.scale(), &(by_drift * (now.by_scale - window.by_scale)));
-        columns.push((first + s.height(), -(turned * (seen.mount * look.by_height))));
+        let by_height = -(turned * (seen.mount * look.by_height));
+        columns.push((first + s.height(), by_height));
+        for (i, (height, tilt)) in look.by_latitude.iter().enumerate() {
+            columns.push((first + s.latitude() + i, by_height * *height - tilt));
+        }
         if look.is_celestial {
             let rate = super::problem::EARTH_RATE_RAD_S;
             columns.push((first + s.utc(), -(Vector3::z() * rate).cross(&reference)));
@@ -174,14 +182,17 @@ impl Problem {
         let drift = UnitQuaternion::from_scaled_axis(-(by.0 * at(s.bias()) + by.1 * at(s.scale())));
         let to_fixed = state.windows[tracked.window];
         let attitude = to_fixed * drift * now.attitude.into_inner();
-        let turned = attitude * UnitQuaternion::from_scaled_axis(at(s.tracker()));
+        // The attitude is that of the unit, and the tracker's that of the vehicle.
+        let of_vehicle = attitude * UnitQuaternion::from_scaled_axis(at(s.unit()));
+        let turned = of_vehicle * UnitQuaternion::from_scaled_axis(at(s.tracker()));
         let error = (tracked.attitude * turned.inverse()).scaled_axis();
         let matrix = to_fixed.to_rotation_matrix().into_inner();
         let mut columns = Vec::with_capacity(12);
         three(&mut columns, 3 * tracked.window, &-Matrix3::identity());
         three(&mut columns, first + s.bias(), &(matrix * by.0));
         three(&mut columns, first + s.scale(), &(matrix * by.1));
-        three(&mut columns, first + s.tracker(), &-attitude.to_rotation_matrix().into_inner());
+        three(&mut columns, first + s.unit(), &-attitude.to_rotation_matrix().into_inner());
+        three(&mut columns, first + s.tracker(), &-of_vehicle.to_rotation_matrix().into_inner());
         (error, columns)
     }
 

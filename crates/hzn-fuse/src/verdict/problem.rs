@@ -1,5 +1,6 @@
 //! The directions, attitudes and windows of an adjustment.
 
+use hzn_nav::filter::{LatitudeTerm, RADIUS_KM};
 use hzn_nav::frames::{Fixed, Vector};
 use hzn_nav::options::{CameraOptions, Mode, Options};
 use hzn_nav::vectors::{Direction, davenport};
@@ -34,6 +35,9 @@ pub(super) struct Look {
     pub(super) measured: Vector3<f64>,
     /// Its derivative by the limb height, 1/km.
     pub(super) by_height: Vector3<f64>,
+    /// By each coefficient of the latitude: the limb height, and the tilt of the axis from outside in the frame of the
+    /// reference, rad/km.
+    pub(super) by_latitude: [(f64, Vector3<f64>); 2],
     /// The told mount.
     pub(super) mount: UnitQuaternion<f64>,
     /// Direction from outside, in a frame that does not turn.
@@ -245,6 +249,7 @@ fn of_body(
             is_celestial: matches!(seen.body, Body::Sun | Body::Moon),
             measured: measured.into_inner(),
             by_height: seen.by_limb_height.into_inner(),
+            by_latitude: by_latitude(inputs, seen, time_s, &reference),
             mount: camera.mount.into_inner(),
             reference: about_pole(time_s) * Vector::<Fixed>::into_inner(reference),
             own_sigma,
@@ -253,6 +258,16 @@ fn of_body(
         })
     };
     seen.iter().filter_map(look).collect()
+}
+
+/// Returns what each coefficient of the latitude does to a direction: nothing to that of Sun or Moon. Without a
+/// receiver the position is that of the told altitude against the direction from outside.
+fn by_latitude(inputs: &Inputs, seen: &Seen, time_s: f64, reference: &Vector<Fixed>) -> [(f64, Vector3<f64>); 2] {
+    let of_altitude = || Some(*reference * -1e3 * (RADIUS_KM + seen.altitude_km?));
+    let position_m = receiver_at(&inputs.gnss, time_s).map(|at| at.0).or_else(of_altitude);
+    let terms = position_m.filter(|_| seen.body == Body::Limb).and_then(|at| LatitudeTerm::both(&at));
+    let turn = about_pole(time_s);
+    terms.map_or([(0.0, Vector3::zeros()); 2], |terms| terms.map(|term| (term.height, turn * term.tilt.into_inner())))
 }
 
 /// Returns every so many of a list, so that at most [`MOST_LOOKS`] remain.
@@ -274,8 +289,11 @@ fn sigmas(shared: Shared, cameras: &[CameraOptions], options: &Options) -> Vec<f
         put(shared.mount(number), 3, sigma_of(camera.misalignment));
         put(shared.clock(number), 1, sigma_of(camera.clock));
     }
+    // Axes of the gyros that are turned against the vehicle look like a turn of all mounts.
+    put(shared.unit(), 3, sigma_of(options.imu.gyro_misalignment));
     put(shared.bias(), 3, sigma_of(options.imu.gyro_bias));
     put(shared.scale(), 3, sigma_of(options.imu.gyro_scale));
     put(shared.height(), 1, sigma_of(options.limb_height));
+    put(shared.latitude(), 2, sigma_of(options.limb_latitude));
     sigmas
 }

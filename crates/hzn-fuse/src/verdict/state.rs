@@ -19,7 +19,7 @@ impl Shared {
     pub(super) fn clocks(self) -> usize {
         4 * self.cameras
     }
-    /// Rotation of the inertial unit, or of all mounts together.
+    /// Rotation of the axes of the inertial unit, or of all mounts together, rad.
     pub(super) fn unit(self) -> usize {
         self.clocks() + 1
     }
@@ -39,8 +39,12 @@ impl Shared {
     pub(super) fn tracker(self) -> usize {
         self.clocks() + 12
     }
-    pub(super) fn len(self) -> usize {
+    /// The two coefficients of the limb height's change with the latitude, km.
+    pub(super) fn latitude(self) -> usize {
         self.clocks() + 15
+    }
+    pub(super) fn len(self) -> usize {
+        self.clocks() + 17
     }
 }
 
