@@ -223,17 +223,28 @@ impl Default for Gnss {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Orbit {
-    /// Accelerations beyond the gravity to J4, as white noise, m/s²/√Hz: harmonics with the longitude are 3·10⁻⁵ m/s²
-    /// in low orbit and last some minutes, and drag above 400 km is less.
+    /// Accelerations beyond drag and the gravity to J4, as white noise, m/s²/√Hz: harmonics with the longitude are
+    /// 3·10⁻⁵ m/s² in low orbit and last some minutes.
     pub accel_noise_mps2_rthz: f64,
     /// Correlation time of the slow error of a limb, s, instead of that of the camera: in a quarter of an orbit another
     /// part of the limb, with another light and weather, comes into view.
     pub slow_error_time_s: f64,
+    /// Ballistic coefficient: drag coefficient 2.2 times area over mass, m²/kg. Small satellites with panels have 0.04,
+    /// compact ones 0.005. With 0 there is no drag.
+    pub ballistic_m2_kg: f64,
+    /// 1-sigma of the drag, in percent of that of a mean Sun with `ballistic_m2_kg`. It is considered: it widens the
+    /// covariance, and is not estimated. The density of the air at 300 km changes by a factor of 3 with the Sun.
+    pub drag_sigma_percent: f64,
 }
 
 impl Default for Orbit {
     fn default() -> Self {
-        Self { accel_noise_mps2_rthz: 1e-3, slow_error_time_s: 1400.0 }
+        Self {
+            accel_noise_mps2_rthz: 1e-3,
+            slow_error_time_s: 1400.0,
+            ballistic_m2_kg: 0.02,
+            drag_sigma_percent: 100.0,
+        }
     }
 }
 
@@ -335,6 +346,8 @@ impl Settings {
             above("[gnss] velocity_sigma_mps", self.gnss.velocity_sigma_mps),
             above("[orbit] accel_noise_mps2_rthz", self.orbit.accel_noise_mps2_rthz),
             above("[orbit] slow_error_time_s", self.orbit.slow_error_time_s),
+            sigma("[orbit] ballistic_m2_kg", self.orbit.ballistic_m2_kg),
+            sigma("[orbit] drag_sigma_percent", self.orbit.drag_sigma_percent),
         ];
         all.extend(imu.accel_noise_mg_rthz.map(|x| sigma("[imu] accel_noise_mg_rthz", x)));
         all.extend(imu.gyro_noise_deg_rth.map(|x| sigma("[imu] gyro_noise_deg_rth", x)));

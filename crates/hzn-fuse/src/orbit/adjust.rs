@@ -1,8 +1,8 @@
 //! Levenberg and Marquardt's steps to the most probable orbit.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
-use super::dynamics::Motion;
+use super::dynamics::{Carried, Motion};
 use super::estimates::{Estimates, Places};
 use super::problem::{Problem, Weighed};
 use crate::error::Error;
@@ -113,17 +113,30 @@ fn descend(
 pub(super) struct Covariances<'a> {
     marginals: Marginals<'a>,
     pattern: &'a Pattern,
-    /// For each considered error, by how much its sigma moves all unknowns.
-    moved: Vec<DVector<f64>>,
+    /// Each considered error with its sigma, and by how much this moves all unknowns.
+    moved: Vec<((usize, f64), DVector<f64>)>,
 }
 
 impl Covariances<'_> {
     /// Returns the covariance of a block; `None` if the factor does not have it.
     pub(super) fn of(&self, block: usize) -> Option<DMatrix<f64>> {
         let mut covariance = self.marginals.block(block, block)?;
-        for moved in &self.moved {
+        for (_, moved) in &self.moved {
             let own = moved.rows(self.pattern.start(block), self.pattern.size(block));
             covariance += own * own.transpose();
+        }
+        Some(covariance)
+    }
+
+    /// Returns the covariance of a motion that depends on a knot and, on the way from there, on an error of the whole
+    /// flight; `None` if the factor does not have it.
+    pub(super) fn of_motion(&self, knot: usize, carried: &Carried, which: Option<usize>) -> Option<Matrix6<f64>> {
+        let own: Matrix6<f64> = self.marginals.block(knot, knot)?.fixed_view::<6, 6>(0, 0).into_owned();
+        let mut covariance = carried.by * own * carried.by.transpose();
+        for ((error, sigma), moved) in &self.moved {
+            let on_the_way = if which == Some(*error) { carried.by_drag * *sigma } else { Vector6::zeros() };
+            let moved = carried.by * moved.fixed_rows::<6>(self.pattern.start(knot)) + on_the_way;
+            covariance += moved * moved.transpose();
         }
         Some(covariance)
     }
@@ -144,17 +157,18 @@ pub(super) fn with_covariances<R>(
         .ok_or_else(|| Error::failed("--solve: the limbs do not determine the orbit; give more of them"))?;
     let moved = places.considered().map(|(which, sigma)| {
         let by_one: Vec<Weighed> = at.errors.iter().filter_map(|e| by(e, at.estimates.shared_block(), which)).collect();
-        factor.step(&normal(&pattern, &by_one, is_weighed)) * sigma
+        ((which, sigma), factor.step(&normal(&pattern, &by_one, is_weighed)) * sigma)
     });
     let moved: Vec<_> = moved.collect();
     let covariances = Covariances { marginals: Marginals::new(&pattern, &factor), pattern: &pattern, moved };
     Ok(call(&covariances, &factor, &pattern))
 }
 
-/// Returns the derivatives of a sight, with that by one error of the whole flight in place of the error; `None` if it
-/// does not depend on it.
+/// Returns the derivatives of a sight or of the motion between knots, with that by one error of the whole flight in
+/// place of the error; `None` if it does not depend on it.
 fn by(error: &Weighed, shared: usize, which: usize) -> Option<Weighed> {
-    error.sight?;
+    // What is known before of the errors of the whole flight joins no other block.
+    (error.linear.derivatives.len() > 1).then_some(())?;
     let (_, matrix) = error.linear.derivatives.iter().find(|(block, _)| *block == shared)?;
     let column = matrix.column(which);
     (column.norm_squared() > 0.0).then(|| {

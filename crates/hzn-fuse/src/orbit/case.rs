@@ -40,7 +40,7 @@ impl<'a> Case<'a> {
         let recordings = inputs.recordings.iter().zip(mounts);
         let cameras: Vec<CameraOptions> =
             recordings.map(|(r, mount)| settings.camera_options(&r.name, *mount, 1)).collect();
-        let places = Places::new(&options, &cameras);
+        let places = Places::new(&options, &cameras, &settings.orbit);
         Self { inputs, settings, mounts, cameras, places }
     }
 
@@ -107,6 +107,7 @@ impl<'a> Case<'a> {
             links,
             slow,
             density: self.settings.orbit.accel_noise_mps2_rthz,
+            ballistic_m2_kg: self.settings.orbit.ballistic_m2_kg,
             gate_probability: self.settings.gate_probability,
         }
     }

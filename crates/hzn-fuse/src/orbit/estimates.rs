@@ -5,6 +5,7 @@ use hzn_nav::options::{Block, CameraOptions, Mode, Options};
 use nalgebra::{DVector, Vector3};
 
 use super::dynamics::Motion;
+use crate::settings::Orbit;
 
 /// Part of the variance of a slow error that each of its three parts has: one stays the same all flight, one changes
 /// with the time of `orbit.slow_error_time_s`, and one changes [`FASTER`] times as fast.
@@ -27,6 +28,8 @@ pub(super) struct Places {
     pub(super) clocks: Vec<Option<usize>>,
     pub(super) height: Option<usize>,
     pub(super) latitude: Option<usize>,
+    /// The relative error of the drag.
+    pub(super) drag: Option<usize>,
     /// The part of the slow error that stays the same all flight, over its root, of the cameras that have one.
     pub(super) lasting: Vec<Option<usize>>,
     /// 1-sigma of each: rad, s, km, 1.
@@ -36,7 +39,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    pub(super) fn new(options: &Options, cameras: &[CameraOptions]) -> Self {
+    pub(super) fn new(options: &Options, cameras: &[CameraOptions], orbit: &Orbit) -> Self {
         let mut out = Self::default();
         for camera in cameras {
             let mount = out.add(&camera.misalignment, 3);
@@ -46,6 +49,8 @@ impl Places {
         }
         out.height = out.add(&options.limb_height, 1);
         out.latitude = out.add(&options.limb_latitude, 2);
+        let drag = if orbit.ballistic_m2_kg > 0.0 { 0.01 * orbit.drag_sigma_percent } else { 0.0 };
+        out.drag = out.add(&Block { mode: Mode::Considered, sigma: drag }, 1);
         for camera in cameras {
             let lasting = out.add(&Block { mode: camera.slow_error, sigma: SHARE.sqrt() }, 3);
             out.lasting.push(lasting);
@@ -159,6 +164,10 @@ impl Estimates {
     pub(super) fn slow(&self, places: &Places, camera: usize, index: usize) -> Vector3<f64> {
         let changing: Vector3<f64> = self.slow.iter().skip(index).take(2).sum();
         self.three(places.lasting.get(camera).copied().flatten()) + changing * SHARE.sqrt()
+    }
+    /// Returns the relative error of the drag.
+    pub(super) fn drag(&self, places: &Places) -> f64 {
+        self.one(places.drag)
     }
     pub(super) fn latitude_km(&self, places: &Places) -> [f64; 2] {
         [self.one(places.latitude), self.one(places.latitude.map(|first| first + 1))]

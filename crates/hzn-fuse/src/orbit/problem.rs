@@ -4,7 +4,7 @@ use hzn_nav::filter::{LatitudeTerm, chi2_limit, predict_direction};
 use hzn_nav::frames::{Cam, Fixed, Rotation, Vector, Vehicle};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 
-use super::dynamics::{Motion, carried, carried_with_derivative, noise};
+use super::dynamics::{Carried, Motion, carried, carried_with_derivative, noise};
 use super::estimates::{Estimates, Places, SHARE};
 use super::sights::{Attitudes, Sight};
 use crate::input::Body;
@@ -42,6 +42,8 @@ pub(super) struct Problem<'a> {
     pub(super) slow: &'a [Option<usize>],
     /// Accelerations that the dynamics do not have, m/s²/√Hz.
     pub(super) density: f64,
+    /// Drag area over mass, m²/kg.
+    pub(super) ballistic_m2_kg: f64,
     pub(super) gate_probability: f64,
 }
 
@@ -99,19 +101,18 @@ impl Problem<'_> {
                 derivatives: vec![(estimates.attitude_block(row), dense(&(Matrix3::identity() / sigma)))],
             }));
         }
-        let mut from: Option<(usize, Motion, Matrix6<f64>, f64)> = None;
+        let mut from: Option<(usize, Carried, f64)> = None;
         for (number, sight) in self.sights.iter().enumerate() {
             let knot = estimates.knot_before(sight.time_s);
             let (at_s, state) = (*estimates.times_s.get(knot)?, estimates.knots.get(knot)?);
             // From sight to sight, so that each second is integrated once.
-            let (motion, by, since_s) = match from.filter(|(k, ..)| *k == knot) {
-                Some((_, motion, by, since_s)) => (motion, by, since_s),
-                None => (*state, Matrix6::identity(), at_s),
+            let (before, since_s) = match from.filter(|(k, ..)| *k == knot) {
+                Some((_, before, since_s)) => (before, since_s),
+                None => (Carried::at_rest(state), at_s),
             };
-            let (motion, step) = carried_with_derivative(&motion, sight.time_s - since_s);
-            let by = step * by;
-            from = Some((knot, motion, by, sight.time_s));
-            let linear = self.sighted(estimates, number, (knot, &motion, &by))?;
+            let now = before.further(sight.time_s - since_s, self.ballistic(estimates));
+            let linear = self.sighted(estimates, number, (knot, &now))?;
+            from = Some((knot, now, sight.time_s));
             let limit = chi2_limit(linear.error.len(), self.gate_probability);
             let (cost, weight) = loss.of(linear.error.norm_squared(), limit);
             all.push(Weighed { sight: Some(number), linear, weight, cost });
@@ -122,11 +123,28 @@ impl Problem<'_> {
     /// Returns the error of the dynamics up to a knot.
     fn between(&self, estimates: &Estimates, to: usize) -> Option<Linear> {
         let time_s = estimates.times_s.get(to)? - estimates.times_s.get(to - 1)?;
-        let (motion, by) = carried_with_derivative(estimates.knots.get(to - 1)?, time_s);
+        let before = estimates.knots.get(to - 1)?;
+        let Carried { motion, by, by_drag } = carried_with_derivative(before, time_s, self.ballistic(estimates));
         let factor = noise(time_s, self.density).cholesky()?.l();
         let error: Vector6<f64> = factor.solve_lower_triangular(&(estimates.knots.get(to)? - motion))?;
         let own = factor.solve_lower_triangular(&Matrix6::identity())?;
-        Some(Linear { error: vector(&error), derivatives: vec![(to - 1, dense(&(own * -by))), (to, dense(&own))] })
+        let mut derivatives = vec![(to - 1, dense(&(own * -by))), (to, dense(&own))];
+        if let Some(drag) = self.places.drag {
+            let mut by_shared = DMatrix::zeros(6, self.places.len());
+            by_shared.set_column(drag, &(own * -by_drag));
+            derivatives.push((estimates.shared_block(), by_shared));
+        }
+        Some(Linear { error: vector(&error), derivatives })
+    }
+
+    /// Returns the drag area over mass at the estimates, m²/kg.
+    fn ballistic(&self, estimates: &Estimates) -> f64 {
+        self.ballistic_m2_kg * (1.0 + estimates.drag(self.places))
+    }
+
+    /// Returns a motion a little later or earlier.
+    fn shifted(&self, motion: &Motion, shift_s: f64, estimates: &Estimates) -> Motion {
+        if shift_s == 0.0 { *motion } else { carried(motion, shift_s, self.ballistic(estimates)) }
     }
 
     /// Returns the first slow error of a sight.
@@ -139,19 +157,18 @@ impl Problem<'_> {
         &self,
         estimates: &Estimates,
         number: usize,
-        (knot, motion, by): (usize, &Motion, &Matrix6<f64>),
+        (knot, Carried { motion, by, by_drag }): (usize, &Carried),
     ) -> Option<Linear> {
         let sight = self.sights.get(number)?;
         let mount = estimates.mount(self.places, sight.camera, self.told.get(sight.camera)?);
         let clock_s = estimates.clock_s(self.places, sight.camera);
-        let part = sight.between.part;
-        let rows = [(sight.between.row, 1.0 - part), (sight.between.row + 1, part)];
+        let rows = [(sight.between.row, 1.0 - sight.between.part), (sight.between.row + 1, sight.between.part)];
         let error_at = |row: usize| estimates.attitudes.get(row).copied().unwrap_or_default();
         let turned: Vector3<f64> = rows.iter().map(|(row, share)| error_at(*row) * *share).sum();
         let seen = |shift_s: f64| {
             let attitude = self.attitudes.at(sight.between, shift_s)?;
             let attitude: Rotation<Vehicle, Fixed> = Rotation::from_scaled_axis(turned.into()) * attitude;
-            let place = position(&if shift_s == 0.0 { *motion } else { carried(motion, shift_s) });
+            let place = position(&self.shifted(motion, shift_s, estimates));
             Some((predict_direction(&attitude, &mount, &axis(&place)?), place, attitude))
         };
         let ((predicted, by_attitude, by_mount), place, attitude) = seen(clock_s)?;
@@ -183,6 +200,7 @@ impl Problem<'_> {
             put(self.places.lasting.get(sight.camera).copied().flatten(), dense(&(sight.across * sight.root)));
             expected += sight.root * estimates.slow(self.places, sight.camera, slow);
         }
+        put(self.places.drag, dense(&(sight.across * by_position * by_drag.fixed_rows::<3>(0))));
         let by_position: SMatrix<f64, 3, 6> = by_position * by.fixed_rows::<3>(0);
         let mut derivatives = vec![(knot, dense(&(sight.across * by_position))), (estimates.shared_block(), by_shared)];
         for (row, share) in rows.into_iter().filter(|(row, share)| *share > 0.0 && *row < estimates.attitudes.len()) {

@@ -8,26 +8,26 @@ use hzn_nav::gravity::earth_rate;
 use hzn_nav::strapdown::Nominal;
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-use super::adjust::with_covariances;
+use super::adjust::{Covariances, with_covariances};
 use super::case::{Case, Solution};
 use super::dynamics::{GM_M3_S2, Motion, carried_with_derivative, noise};
 use super::problem::position;
 use crate::error::Error;
 use crate::input::Body;
-use crate::results::{CameraState, Determined, Epoch, Kind, Lowered, Orbit, Solved};
+use crate::results::{self, CameraState, Determined, Epoch, Kind, Lowered, Solved};
+use crate::settings::Orbit;
 
 /// Returns the solutions at the pictures, and how they were found.
 pub(super) fn report(case: &Case<'_>, solution: &Solution, names: &[String]) -> Result<(Vec<Epoch>, Solved), Error> {
     let at = &solution.adjusted;
     let missing = || Error::failed("--solve: a covariance is missing");
     let (mut epochs, mut solved) = with_covariances(at, &case.places, true, |covariances, factor, pattern| {
-        let own = |knot: usize| covariances.of(knot);
         let shared = covariances.of(at.estimates.shared_block())?;
         let considered: BTreeMap<usize, f64> = case.places.considered().collect();
         let estimated = |i: usize| shared.get((i, i)).copied().unwrap_or(0.0).max(0.0).sqrt();
         let sigma = |i: usize| considered.get(&i).copied().unwrap_or_else(|| estimated(i));
         let cameras = cameras(case, solution, &sigma);
-        let mut epochs = epochs(case, solution, &own, &cameras)?;
+        let mut epochs = epochs(case, solution, covariances, &cameras)?;
         let of_limb = |place: Option<usize>| place.map_or(0.0, sigma);
         for epoch in &mut epochs {
             epoch.limb_height_sigma_km = of_limb(case.places.height);
@@ -56,10 +56,9 @@ pub(super) fn report(case: &Case<'_>, solution: &Solution, names: &[String]) -> 
         ..Corrections::default()
     };
     epochs.iter_mut().for_each(|epoch| epoch.corrections = corrections);
-    let bound = with_covariances(at, &case.places, false, |covariances, _, _| {
-        self::epochs(case, solution, &|knot| covariances.of(knot), &[])
-    })?
-    .ok_or_else(missing)?;
+    let bound =
+        with_covariances(at, &case.places, false, |covariances, _, _| self::epochs(case, solution, covariances, &[]))?
+            .ok_or_else(missing)?;
     solved.orbit = orbit(&epochs, &bound);
     for sight in &solution.sights {
         *solved.sources.entry((Some(sight.camera), Kind::Direction(Body::Limb))).or_default() += 1;
@@ -76,7 +75,7 @@ fn orbit_axes(state: &Nominal) -> Matrix3<f64> {
 }
 
 /// Returns the elements at the end, and the RMS sigmas and bounds of the position.
-fn orbit(epochs: &[Epoch], bound: &[Epoch]) -> Option<Orbit> {
+fn orbit(epochs: &[Epoch], bound: &[Epoch]) -> Option<results::Orbit> {
     let last = epochs.last()?;
     let rms = |all: &[Epoch]| -> [f64; 3] {
         let sum: Vector3<f64> = all
@@ -93,7 +92,7 @@ fn orbit(epochs: &[Epoch], bound: &[Epoch]) -> Option<Orbit> {
     let semi_axis_m = 1.0 / (2.0 / x.norm() - v.norm_squared() / GM_M3_S2);
     let momentum = x.cross(&v);
     let eccentricity = (v.cross(&momentum) / GM_M3_S2 - x.normalize()).norm();
-    Some(Orbit {
+    Some(results::Orbit {
         semi_axis_m,
         eccentricity,
         inclination_rad: (momentum.z / momentum.norm()).clamp(-1.0, 1.0).acos(),
@@ -126,7 +125,7 @@ fn cameras(case: &Case<'_>, solution: &Solution, sigma: &dyn Fn(usize) -> f64) -
 fn epochs(
     case: &Case<'_>,
     solution: &Solution,
-    own: &dyn Fn(usize) -> Option<nalgebra::DMatrix<f64>>,
+    covariances: &Covariances<'_>,
     cameras: &[CameraState],
 ) -> Option<Vec<Epoch>> {
     let estimates = &solution.adjusted.estimates;
@@ -137,10 +136,11 @@ fn epochs(
         }
         let knot = estimates.knot_before(sight.time_s);
         let time_s = sight.time_s - estimates.times_s.get(knot)?;
-        let (motion, by) = carried_with_derivative(estimates.knots.get(knot)?, time_s);
-        let before: Matrix6<f64> = own(knot)?.fixed_view::<6, 6>(0, 0).into_owned();
-        let covariance = by * before * by.transpose() + noise(time_s, case.settings.orbit.accel_noise_mps2_rthz);
-        out.push(epoch(solution, sight, (&motion, &covariance), cameras)?);
+        let Orbit { ballistic_m2_kg, accel_noise_mps2_rthz, .. } = case.settings.orbit;
+        let drag = ballistic_m2_kg * (1.0 + estimates.drag(&case.places));
+        let now = carried_with_derivative(estimates.knots.get(knot)?, time_s, drag);
+        let covariance = covariances.of_motion(knot, &now, case.places.drag)? + noise(time_s, accel_noise_mps2_rthz);
+        out.push(epoch(solution, sight, (&now.motion, &covariance), cameras)?);
     }
     Some(out)
 }
@@ -213,6 +213,7 @@ fn determined(case: &Case<'_>, solution: &Solution, names: &[String], sigma: &dy
     };
     add("limb height".into(), "km", 1.0, places.height, 1);
     add("limb by latitude".into(), "km", 1.0, places.latitude, 2);
+    add("drag".into(), "%", 100.0, places.drag, 1);
     for ((name, mount), clock) in names.iter().zip(&places.mounts).zip(&places.clocks) {
         add(format!("mount of {name}"), "deg", 1f64.to_degrees(), *mount, 3);
         add(format!("clock of {name}"), "s", 1.0, *clock, 1);

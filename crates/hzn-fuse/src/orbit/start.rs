@@ -85,7 +85,7 @@ pub(super) fn knots(
     let mut motions: Vec<Motion> = Vec::with_capacity(times_s.len());
     for (time_s, place) in times_s.iter().zip(&at_knots) {
         let own = motion(&places, *time_s, WINDOW * period_s(place));
-        let carried_on = |last: &Motion| carried(last, time_s - times_s.get(motions.len() - 1).unwrap_or(time_s));
+        let carried_on = |last: &Motion| carried(last, time_s - times_s.get(motions.len() - 1).unwrap_or(time_s), 0.0);
         let rough = || motion(&places, *time_s, LONG_WINDOW * period_s(place));
         let next = own.or_else(|| motions.last().map(carried_on)).or_else(rough);
         motions.push(next.ok_or_else(|| sparse(*time_s, place))?);

@@ -46,11 +46,13 @@ struct Plan {
     step_s: f64,
     /// Correlation time of the slow error, s.
     slow_s: f64,
+    /// Drag area over mass, m²/kg.
+    ballistic_m2_kg: f64,
 }
 
 impl Plan {
     fn new(elements: Elements, seed: u64, span_s: f64) -> Self {
-        Self { elements, seed, span_s, step_s: 60.0, slow_s: 1400.0 }
+        Self { elements, seed, span_s, step_s: 60.0, slow_s: 1400.0, ballistic_m2_kg: 0.022 }
     }
 }
 
@@ -74,8 +76,8 @@ impl Elements {
 }
 
 /// Gravity in inertial axes: the zonal harmonics J2 to J4 as the gradient of their potential by differences, the
-/// tesseral harmonic of degree and order 2, and drag. The last two are not in the dynamics of the solve.
-fn acceleration(x: &Vector3<f64>, v: &Vector3<f64>, time_s: f64) -> Vector3<f64> {
+/// tesseral harmonic of degree and order 2, which is not in the dynamics of the solve, and drag.
+fn acceleration(x: &Vector3<f64>, v: &Vector3<f64>, time_s: f64, ballistic_m2_kg: f64) -> Vector3<f64> {
     let potential = |x: &Vector3<f64>| {
         let (r, s) = (x.norm(), x.z / x.norm());
         let ratio = 6_378_137.0 / r;
@@ -94,13 +96,18 @@ fn acceleration(x: &Vector3<f64>, v: &Vector3<f64>, time_s: f64) -> Vector3<f64>
         step[i] = 100.0;
         (potential(&(x + step)) - potential(&(x - step))) / 200.0
     });
-    let density = 5e-13 * (-(x.norm() - 6_871e3) / 60e3).exp();
+    let height_km = (x.norm() - 6_378_137.0 * (1.0 - (x.z / x.norm()).powi(2) / 298.257)) * 1e-3;
+    let density = if height_km < 350.0 {
+        2.418e-11 * (-(height_km - 300.0) / 53.6).exp()
+    } else {
+        5e-13 * (-(x.norm() - 6_871e3) / 60e3).exp()
+    };
     let wind = v - Vector3::new(0.0, 0.0, SPIN).cross(x);
-    gradient - x * (3.986_004_418e14 / x.norm().powi(3)) - wind * (0.5 * density * 0.022 * wind.norm())
+    gradient - x * (3.986_004_418e14 / x.norm().powi(3)) - wind * (0.5 * density * ballistic_m2_kg * wind.norm())
 }
 
-fn step((x, v): Truth, time_s: f64, h: f64) -> Truth {
-    let slope = |x: Vector3<f64>, v: Vector3<f64>, t: f64| (v, acceleration(&x, &v, t));
+fn step((x, v): Truth, time_s: f64, h: f64, ballistic_m2_kg: f64) -> Truth {
+    let slope = |x: Vector3<f64>, v: Vector3<f64>, t: f64| (v, acceleration(&x, &v, t, ballistic_m2_kg));
     let (x1, v1) = slope(x, v, time_s);
     let (x2, v2) = slope(x + x1 * (h / 2.0), v + v1 * (h / 2.0), time_s + h / 2.0);
     let (x3, v3) = slope(x + x2 * (h / 2.0), v + v2 * (h / 2.0), time_s + h / 2.0);
@@ -131,7 +138,7 @@ fn axis_of_limb(position_m: &Vector3<f64>) -> Vector3<f64> {
 
 /// Simulates a flight: the inputs as a user has them, with the errors that the covariances tell.
 fn simulate(plan: Plan) -> (Inputs, Vec<Place>) {
-    let Plan { elements, seed, span_s, step_s, slow_s } = plan;
+    let Plan { elements, seed, span_s, step_s, slow_s, ballistic_m2_kg } = plan;
     let mut draws = Draws(seed);
     let mut three = |sigma: f64| Vector3::from_fn(|_, _| sigma * draws.normal());
     let mount_error = three(MOUNT);
@@ -176,7 +183,7 @@ fn simulate(plan: Plan) -> (Inputs, Vec<Place>) {
         places.push(Place { time_s, position_m, axes });
         slow = slow * keep + three(SLOW) * (1.0 - keep * keep).sqrt();
         for i in 0..(step_s / DYNAMICS_S) as u32 {
-            truth = step(truth, time_s + DYNAMICS_S * f64::from(i), DYNAMICS_S);
+            truth = step(truth, time_s + DYNAMICS_S * f64::from(i), DYNAMICS_S, ballistic_m2_kg);
         }
     }
     let told_mount: Rotation<Cam, Vehicle> = mount.into();
@@ -252,6 +259,51 @@ fn the_error_is_that_of_the_bound() {
         let nees_most = if seeds < 10 { 5.0 } else { 2.0 };
         assert!(nees.iter().all(|n| (least..nees_most).contains(n)), "{name}: {nees}");
     }
+}
+
+/// The drag of a light satellite at 300 km is drawn from its prior. It is in the sigmas, and without it they are too
+/// small.
+#[test]
+fn drag_from_its_prior_is_covered() {
+    const LIGHT_M2_KG: f64 = 0.04;
+    const SIGMA: f64 = 0.5;
+    let seeds: u64 = std::env::var("HZN_FLIGHTS").ok().and_then(|n| n.parse().ok()).unwrap_or(2);
+    let mut told = settings();
+    (told.orbit.ballistic_m2_kg, told.orbit.drag_sigma_percent) = (LIGHT_M2_KG, 100.0 * SIGMA);
+    let mut exact = told.clone();
+    exact.orbit.drag_sigma_percent = 0.0;
+    let mut none = told.clone();
+    none.orbit.ballistic_m2_kg = 0.0;
+    let mut sums = [[Vector3::zeros(); 3]; 3];
+    let mut count = 0.0;
+    for seed in 0..seeds {
+        // Near-circular orbits of several inclinations and nodes.
+        let part = seed as f64 / seeds as f64;
+        let elements = Elements([6.678e6, 0.001, 97.0 - 60.0 * part, 360.0 * part, 30.0, 200.0 * part]);
+        // At both sides of the prior in turn, or few flights scatter on one side.
+        let draw = Draws(5000 + seed).normal().abs() * if seed % 2 == 0 { 1.0 } else { -1.0 };
+        let ballistic_m2_kg = LIGHT_M2_KG * (1.0 + SIGMA * draw);
+        let (inputs, places) = simulate(Plan { ballistic_m2_kg, ..Plan::new(elements, 5000 + seed, 3.0 * 5430.0) });
+        for (settings, sums) in [&told, &exact, &none].into_iter().zip(&mut sums) {
+            let fused = fuse(&inputs, settings, Wanted { solved: true, ..Wanted::default() }).unwrap();
+            add(sums, &fused, &places);
+            count += fused.smoothed.len() as f64 / 3.0;
+        }
+    }
+    let [told, exact, none] = sums.map(|[error, variance, nees]| {
+        let km = |v: Vector3<f64>| (v / count).map(|x| x.sqrt() / 1e3);
+        println!(
+            "error {:.2?} km, sigma {:.2?} km, NEES {:.2?}",
+            km(error).data,
+            km(variance).data,
+            (nees / count).data
+        );
+        nees / count
+    });
+    let [most, least] = if seeds < 10 { [5.0, 0.1] } else { [2.0, 0.5] };
+    assert!(told.iter().all(|n| (least..most).contains(n)), "{told}");
+    // Along the orbit.
+    assert!(exact.y > told.y && none.y > exact.y, "{told} {exact} {none}");
 }
 
 #[test]
