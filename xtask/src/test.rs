@@ -77,6 +77,7 @@ const STEPS: &[Step] = &[
     long("flipped bits", |_| campaign::flips(20_000)),
     long("power cuts", |_| campaign::cuts(12)),
     long("verdicts over flights", |_| campaign::flights(200)),
+    long("calibrations over flights", |_| campaign::check(100, 910_000)),
     long("artefacts", |_| campaign::artefacts(15)),
 ];
 

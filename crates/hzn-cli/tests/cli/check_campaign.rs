@@ -81,7 +81,7 @@ impl Count {
 
 #[test]
 fn verdicts_over_right_and_wrong_lenses() {
-    let (flights, seed) = (number("HZN_CHECKS", 4), number("HZN_SEED", SEED));
+    let (flights, seed) = (number("HZN_CHECKS", 2), number("HZN_SEED", SEED));
     let place = Place::new();
     let mut counts = [[Count::default(); ERRORS_PERCENT.len()]; KINDS.len()];
     for flight in 0..flights {

@@ -166,8 +166,8 @@ fn coarse_steps_of_the_gyros_are_a_noise() {
     assert!(refused * 100 < fused.innovations.len(), "{refused}");
 }
 
-/// The verdict knows the limb by latitude and the axes of the gyros as the filter does. With exact axes, it names a right
-/// mount as wrong. A mount that is wrong is found.
+/// The verdict knows the limb by latitude and the axes of the gyros as the filter does. With exact axes, a right mount
+/// looked wrong. A mount that is wrong is found.
 #[test]
 fn the_limb_by_latitude_is_no_wrong_mount() {
     let (_, mut inputs) = drawn(scene().imu.unwrap(), 4.5);
