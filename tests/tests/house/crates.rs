@@ -130,3 +130,25 @@ fn published_crates_have_the_licence_texts() {
     }
     assert!(published > 15, "{published}");
 }
+
+/// A library whose tests are turned off has none: they would never run.
+#[test]
+fn no_unit_test_is_turned_off() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut without = 0;
+    for entry in fs::read_dir(root.join("crates")).unwrap() {
+        let folder = entry.unwrap().path();
+        let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+        let library = manifest.split("[lib]").nth(1).and_then(|rest| rest.split("\n[").next()).unwrap_or_default();
+        if library.contains("\ntest = false") {
+            without += 1;
+            let mut sources = Vec::new();
+            crate::shape::collect_sources(&folder.join("src"), &mut sources);
+            for source in sources {
+                let text = fs::read_to_string(&source).unwrap();
+                assert!(!text.contains("#[cfg(test)]"), "{}: the tests of this file never run", source.display());
+            }
+        }
+    }
+    assert!(without > 0, "no library has its tests turned off, so this test can go");
+}

@@ -14,7 +14,7 @@ const USUAL_FUNCTION_LINES: usize = 60;
 /// may only fall.
 const MAX_LONG_FUNCTIONS: usize = 5;
 
-fn collect_sources(dir: &Path, out: &mut Vec<PathBuf>) {
+pub(crate) fn collect_sources(dir: &Path, out: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(dir).unwrap() {
         let path = entry.unwrap().path();
         if path.is_dir() {
