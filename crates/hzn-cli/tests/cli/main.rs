@@ -23,6 +23,7 @@ mod documents;
 mod doubts;
 mod evaluate;
 mod faults;
+mod first_pictures;
 mod fly;
 mod fly_long;
 mod fly_rig;
