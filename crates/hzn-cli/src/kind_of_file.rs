@@ -1,4 +1,6 @@
-//! What a table is, and which command reads it: for the messages of commands that got another file than they read.
+//! What a file is, and which command reads it: for the messages of commands that got another file than they read.
+
+pub(crate) mod content;
 
 use std::path::Path;
 
@@ -8,7 +10,7 @@ use crate::exit::{Stop, usage};
 
 /// The tables of hzn, by some of their columns, with their name and the command that reads them. The first one that has
 /// all columns is right.
-const TABLES: [(&[&str], &str, &str); 11] = [
+const TABLES: [(&[&str], &str, &str); 14] = [
     (
         &["index", "body", "status"],
         "results of hzn run",
@@ -19,6 +21,17 @@ const TABLES: [(&[&str], &str, &str); 11] = [
         "the truth of pictures (truth.csv)",
         "hzn evaluate RESULTS --truth reads it",
     ),
+    (
+        &["source", "nis", "taken"],
+        "the innovations of hzn fuse",
+        "hzn view shows them with the results beside them, FILE.csv of FILE.innovations.csv",
+    ),
+    (
+        &["self_check", "parameter_generation"],
+        "the housekeeping of a flight computer",
+        "hzn telemetry --housekeeping writes it for other programs",
+    ),
+    (&["depression_deg", "sigma_max_deg"], "a study of hzn sensitivity", "other programs draw it"),
     (&["file", "u_px", "v_px", "error_u_px"], "residuals of a lens calibration", "hzn view shows them"),
     (&["u_px", "v_px"], "a table of points", "hzn calibrate points reads it"),
     (&["file", "accel_x_mps2"], "a table of the tilts of a board", "hzn calibrate mount reads it"),
@@ -45,10 +58,12 @@ pub(crate) fn of_columns<'a>(header: impl IntoIterator<Item = &'a str>) -> Optio
     TABLES.iter().find(|(columns, ..)| fits(columns)).map(|(_, what, command)| (*what, *command))
 }
 
-/// Returns what a file is, and which command reads it, if it is a table of hzn.
+/// Returns what a file has, and which command reads it, if it has results of hzn or is one of its tables.
 fn of_file(path: &Path) -> Option<(&'static str, &'static str)> {
     match ending(path).as_str() {
-        "csv" if hzn_fuse::read_back::is_solution(path) => Some(("results of hzn fuse", "hzn view shows them")),
+        "csv" | "mcap" if hzn_fuse::read_back::is_solution(path) => {
+            Some(("results of hzn fuse", "hzn view shows them"))
+        }
         "csv" => {
             let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_path(path).ok()?;
             of_columns(reader.headers().ok()?)
@@ -63,9 +78,30 @@ fn of_file(path: &Path) -> Option<(&'static str, &'static str)> {
 }
 
 /// Refuses a table of hzn where something else is needed, for example `a picture`.
-pub(crate) fn refuse_table(path: &Path, needed: &str) -> Result<(), Stop> {
+fn refuse_table(path: &Path, needed: &str) -> Result<(), Stop> {
     let Some((what, command)) = of_file(path) else { return Ok(()) };
     Err(usage(format!("{}: has {what}, and {needed} is needed here; {command}", path.display())))
+}
+
+/// Refuses a file that hzn knows, and that has no pictures.
+pub(crate) fn refuse_without_pictures(path: &Path) -> Result<(), Stop> {
+    const NEEDED: &str = "a picture, a folder or a video";
+    refuse_table(path, NEEDED)?;
+    let Some(content) = content::of_file(path) else { return Ok(()) };
+    let content::Content { what, command, .. } = content;
+    Err(usage(format!("{}: is {what}, and {NEEDED} is needed here; {command}", path.display())))
+}
+
+/// Refuses a file that hzn knows where a sensor.toml is needed.
+pub(crate) fn refuse_no_sensor(path: &Path) -> Result<(), Stop> {
+    const NEEDED: &str = "a sensor.toml";
+    refuse_table(path, NEEDED)?;
+    let Some(content) = content::of_file_or_picture(path).filter(|content| content.kind != "sensor") else {
+        return Ok(());
+    };
+    let content::Content { what, command, .. } = content;
+    let init = if content.kind == "picture" { ", and hzn init FILE writes a sensor.toml for its camera" } else { "" };
+    Err(usage(format!("{}: is {what}, and {NEEDED} is needed here; {command}{init}", path.display())))
 }
 
 /// Refuses a table of hzn that has other rows than results of `hzn run`.

@@ -89,8 +89,12 @@ pub(crate) fn open(inputs: &[PathBuf], sensor: &SensorArgs, input: &InputArgs) -
 
 /// Opens a sequence as [`open`] does.
 pub(crate) fn open_request(request: &Request) -> Result<Opened, Stop> {
-    if let [one] = request.inputs.as_slice() {
-        kind_of_file::refuse_table(one, "a picture, a folder or a video")?;
+    // With a format for headerless pictures, any bytes are pictures.
+    if let ([one], None) = (request.inputs.as_slice(), request.raw) {
+        kind_of_file::refuse_without_pictures(one)?;
+    }
+    if let SensorChoice::File(sensor) = &request.sensor {
+        kind_of_file::refuse_no_sensor(sensor)?;
     }
     let opened = hzn_run::open::open(request)?;
     opened.warnings.iter().for_each(tell::warning);

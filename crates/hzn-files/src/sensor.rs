@@ -46,6 +46,7 @@ pub fn load(path: &Path) -> Result<Sensor, Problem> {
             Problem::new(path, "no such file; `hzn init` writes a commented sensor.toml to start from")
         }
         std::io::ErrorKind::InvalidData => Problem::new(path, "is not text; a sensor.toml is expected"),
+        std::io::ErrorKind::FileTooLarge => Problem::new(path, format!("{e}; a sensor.toml is expected")),
         std::io::ErrorKind::IsADirectory => Problem::new(path, "is a folder; name the sensor.toml in it"),
         _ => Problem::new(path, format!("cannot be read: {e}")),
     })?;

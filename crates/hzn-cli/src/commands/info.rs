@@ -1,5 +1,6 @@
 //! `hzn info`: describes the content of a file.
 
+mod content;
 mod facts;
 mod other;
 #[cfg_attr(not(feature = "simulator"), path = "info/no_scene.rs")]
@@ -25,11 +26,12 @@ use crate::tell::{self, one_line};
 
 /// Say what a file is, and what it contains
 ///
-/// The file may be results (.mcap, .csv, .jsonl), a sensor.toml or camera file, a scene.toml, rig.toml, fuse.toml,
-/// frames.csv, truth.csv, imu.csv, gnss.csv, a picture, a video, or the folder of a bag of ROS 2.
+/// The file may be a folder of pictures, results (.mcap, .csv, .jsonl), a sensor.toml or camera file, a scene.toml, rig.toml, fuse.toml,
+/// frames.csv, truth.csv, imu.csv, gnss.csv, a picture, a video, the folder of a bag of ROS 2, a prepared sensor, a
+/// stream of packets, or a file of attitudes or orbits (AEM, OEM, SPICE).
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// The file
+    /// The file, or a folder of pictures
     file: PathBuf,
     /// Print the facts as one JSON object; names of keys have the unit
     #[arg(long)]
@@ -38,7 +40,11 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let file = &args.file;
-    let (facts, lost) = if source::is_bag(file) { other::bag(file)? } else { one_file(file)? };
+    let (facts, lost) = match () {
+        () if source::is_bag(file) => other::bag(file)?,
+        () if file.is_dir() => (other::folder(file)?, None),
+        () => one_file(file)?,
+    };
     if args.json {
         tell::file(facts.json().map_err(failed)?)?;
     } else {
@@ -55,8 +61,14 @@ fn one_file(file: &Path) -> Result<Described, Stop> {
         "mcap" => recording(file)?,
         "csv" | "jsonl" => (table(file, &kind)?, None),
         "toml" | "yaml" | "yml" => (sensor(file, &kind)?, None),
+        // They are refused with the command that converts them.
+        "db3" | "bag" => (other::bag(file)?.0, None),
         _ if source::is_video(file) => other::video(file)?,
-        _ => (one_picture(file)?, None),
+        _ => match kind_of_file::content::of_file(file) {
+            Some(kind_of_file::content::CAMERA_FILE) => (sensor(file, &kind)?, None),
+            Some(known) => (content::describe(file, known)?, None),
+            None => (one_picture(file)?, None),
+        },
     })
 }
 

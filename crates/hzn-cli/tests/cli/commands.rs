@@ -252,7 +252,7 @@ fn wrong_usage_is_2() {
     ] {
         place.run(&[&["run", "in"], args].concat()).expect(2).says(what);
     }
-    place.run(&["info", "in"]).expect(2).says("is a folder");
+    place.run(&["info", "nowhere"]).expect(2).says("nowhere: no such file");
     place.run(&["recover", "in/0000.png"]).expect(2).says("is not a file of results");
     place.write("other.csv", b"a,b\n1,2\n");
     place.run(&["recover", "other.csv"]).expect(1).says("other.csv: does not have the columns");

@@ -34,6 +34,7 @@ mod gates;
 mod gopro;
 mod hostile;
 mod kept_inputs;
+mod kinds;
 mod mask;
 mod migrate;
 mod night;

@@ -163,7 +163,7 @@ fn patterns_and_single_pictures() {
     let all = ["run", "in/0000.png", "in/0001.png", "in/notes.txt", "in/sensor.toml"];
     assert_eq!(without_time(&place.run(&all).expect(0).out).len(), 2);
     assert_eq!(without_time(&place.run(&["run", "in/*"]).expect(0).out).len(), 12);
-    place.run(&["run", "in/sensor.toml"]).expect(2).says("is not a picture");
+    place.run(&["run", "in/sensor.toml"]).expect(2).says("in/sensor.toml: is a sensor.toml, and a picture, a folder");
     place.run(&["run", "nowhere"]).expect(2).says("nowhere: no such file or folder");
 }
 

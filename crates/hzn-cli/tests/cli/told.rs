@@ -163,7 +163,8 @@ fn init_tells_what_its_file_will_tell() {
 #[test]
 fn inputs_of_another_kind_are_named() {
     let place = Place::with_pictures(1);
-    place.run(&["run", "in", "--sensor", "in/0000.png"]).expect(2).says("in/0000.png: is not text; a sensor.toml");
+    place.write("bytes.bin", b"\xff\xfe");
+    place.run(&["run", "in", "--sensor", "bytes.bin"]).expect(2).says("bytes.bin: is not text; a sensor.toml");
     place.run(&["run", "in", "--sensor", "in"]).expect(2).says("in: is a folder; name the sensor.toml in it");
     if cfg!(unix) {
         place.run(&["info", "/dev/null"]).expect(2).says("/dev/null: is a device, a pipe or a socket");

@@ -29,6 +29,29 @@ pub(super) fn bag(folder: &Path) -> Result<(Facts, Option<String>), Stop> {
     Ok((out, pictures.describe_loss()))
 }
 
+/// Describes a folder of pictures, and the files beside them that `hzn run FOLDER` reads.
+pub(super) fn folder(folder: &Path) -> Result<Facts, Stop> {
+    let pictures = source::open(&[folder.to_owned()], None, None)?;
+    let mut out = Facts::new("folder", "folder of pictures, for `hzn run FOLDER`");
+    let total = pictures.total();
+    total.into_iter().for_each(|n| out.fact("pictures", n.to_string(), "pictures", n));
+    if let Some((name, (width, height))) = pictures.sizes().next() {
+        out.fact("size", format!("{width} x {height} px ({name})"), "width_px", width);
+        out.key("height_px", height);
+    }
+    for (name, missing) in [
+        ("sensor.toml", "not here; `hzn init FOLDER` writes one, and --sensor names one elsewhere"),
+        ("frames.csv", "not here; times, altitudes and attitudes of the pictures would be in it"),
+    ] {
+        let has = folder.join(name).is_file();
+        out.line(name, if has { "here" } else { missing }.to_owned());
+        out.key(&format!("has_{}", name.replace('.', "_")), has);
+    }
+    let notes = pictures.notes();
+    notes.iter().for_each(|note| out.line("note", note.clone()));
+    Ok(out)
+}
+
 /// Number of frames of a video that give its rate.
 const RATE_FRAMES: usize = 100;
 
