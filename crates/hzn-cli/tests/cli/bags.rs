@@ -158,10 +158,25 @@ fn a_start_takes_the_calibration_of_a_bag() {
 fn a_bag_in_sqlite_is_converted_by_its_folder() {
     let place = Place::new();
     fs::create_dir(place.path("old")).unwrap();
+    fs::create_dir(place.path("old bag")).unwrap();
     place.write("old/old_0.db3", b"SQLite format 3\0");
-    place.run(&["run", "old/old_0.db3"]).expect(2).says("rosbags-convert --src old --dst");
+    place.write("old/metadata.yaml", b"rosbag2_bagfile_information:\n");
+    for command in ["run", "info", "init"] {
+        for input in ["old/old_0.db3", "old"] {
+            let ran = place
+                .run(&[command, input])
+                .expect(2)
+                .says("rosbags-convert --src old --dst converted --dst-storage mcap; with ROS 2: ");
+            ran.says(
+                "[{uri: converted, storage_id: mcap, all: true}]' > mcap.yaml && ros2 bag convert -i old -o mcap.yaml",
+            );
+        }
+    }
+    place.write("old bag/a.db3", b"SQLite format 3\0");
+    place.run(&["run", "old bag/a.db3"]).expect(2).says("--src 'old bag' --dst").says("-i 'old bag' -o");
     place.write("old.bag", b"#ROSBAG V2.0\n");
-    place.run(&["run", "old.bag"]).expect(2).says("rosbags-convert --src old.bag --dst");
+    let ran = place.run(&["run", "old.bag"]).expect(2).says("rosbags-convert --src old.bag --dst");
+    assert!(!ran.err.contains("ros2 bag"), "ROS 2 does not convert bags of ROS 1: {}", ran.err);
 }
 
 #[test]

@@ -9,6 +9,7 @@ use super::payload::Payload;
 use super::recording::Recording;
 use super::sequence::Source;
 use crate::error::{Error, unusable};
+use crate::provenance::quoted;
 
 /// The file that makes a folder a bag.
 const METADATA: &str = "metadata.yaml";
@@ -53,14 +54,22 @@ pub fn recordings(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(files)
 }
 
-/// Returns what to do with a bag that hzn does not read. A bag of ROS 2 is converted by its folder.
+/// Returns what to do with a bag that hzn does not read: the commands that convert it. A bag of ROS 2 is converted by its
+/// folder, and ROS itself converts no bag of ROS 1.
 pub fn conversion(from: &Path) -> String {
     let folder = from.parent().filter(|folder| ending(from) == "db3" && !folder.as_os_str().is_empty());
-    let from = folder.unwrap_or(if ending(from) == "db3" { Path::new(".") } else { from });
+    let bag = folder.unwrap_or(if ending(from) == "db3" { Path::new(".") } else { from });
+    let bag = quoted(bag);
+    let with_ros = match ending(from).as_str() {
+        "bag" => String::new(),
+        _ => format!(
+            "; with ROS 2: echo 'output_bags: [{{uri: converted, storage_id: mcap, all: true}}]' > mcap.yaml && ros2 \
+             bag convert -i {bag} -o mcap.yaml"
+        ),
+    };
     format!(
-        "hzn reads bags in MCAP; `pip install rosbags`, then `rosbags-convert --src {} --dst converted --dst-storage \
-         mcap` writes one",
-        from.display()
+        "hzn reads bags in MCAP, so convert it: pip install rosbags && rosbags-convert --src {bag} --dst converted \
+         --dst-storage mcap{with_ros}; then run hzn on the folder converted"
     )
 }
 
