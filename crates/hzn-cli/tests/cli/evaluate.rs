@@ -118,6 +118,7 @@ fn what_does_not_fit_is_named() {
         .says("about sphere, the truth about earth-sphere");
     against(&truth.replace("70.38", "wide")).says("t.csv:2: half_angle_deg: invalid float literal");
     against(&truth.replace("axis_y", "axis")).says("t.csv:1: axis_y: this column is missing");
+    against(&truth.replace("axis_y", "axis").replace("limb", "edge")).says("of which limb, axis_y are missing");
     against(HEADER).says("t.csv: has no rows");
     place.run(&["evaluate", "out.csv", "--truth", "nowhere.csv"]).expect(2).says("nowhere.csv: no such file");
     place.run(&["evaluate", "nothing.csv", "--truth", "in"]).expect(2).says("nothing.csv: no such file");

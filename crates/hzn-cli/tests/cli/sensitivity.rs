@@ -310,3 +310,14 @@ fn several_heads_by_number_angle_and_mount() {
     rig(&["--mount-sigma", "-1"]).expect(2);
     rig(&["--depression", "10"]).expect(2).says("the heads of a rig look at the limb");
 }
+
+#[test]
+fn the_default_errors_of_a_small_picture_are_doubted() {
+    let place = Place::new();
+    let array = ["sensitivity", "--size", "32x24", "--fov", "110", "--altitude", "500", "--lens", "fisheye"];
+    place.run(&array).expect(0).says("A limb of 32 px is shifted as a whole by them");
+    let own = place.run(&[&array[..], &["--sigma-px", "0.05", "--correlation-px", "0"]].concat()).expect(0);
+    assert!(!own.err.contains("default errors"), "{}", own.err);
+    let large = place.run(&["sensitivity", "--fov", "90", "--altitude", "500"]).expect(0);
+    assert!(!large.err.contains("default errors"), "{}", large.err);
+}

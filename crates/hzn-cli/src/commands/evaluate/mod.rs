@@ -69,7 +69,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     let Results { rows, sensor_toml, lost, .. } = read_results(&args.results)?;
     let truth_path = if args.truth.is_dir() { args.truth.join("truth.csv") } else { args.truth.clone() };
     let folder = truth_path.parent().unwrap_or(Path::new(""));
-    let truth = hzn_files::truth::load_directions(&truth_path).map_err(usage)?;
+    let truth = hzn_files::truth::load_directions(&truth_path)
+        .map_err(|e| usage(format!("{e}{}", missing_columns(&truth_path).unwrap_or_default())))?;
     let sensor_path = args.sensor.clone().unwrap_or_else(|| folder.join("sensor.toml"));
     let mut read = hzn_files::files_of_sensor(&sensor_path);
     read.extend([args.results.clone(), truth_path.clone()]);
@@ -118,6 +119,20 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     lost.iter().for_each(tell::warning);
     Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+/// Columns that a truth needs.
+const NEEDED: [&str; 7] = ["file", "body", "limb", "axis_x", "axis_y", "axis_z", "half_angle_deg"];
+
+/// Returns what a truth lacks, if it lacks more than one column: a table that somebody else wrote.
+fn missing_columns(truth: &Path) -> Option<String> {
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(truth).ok()?;
+    let header = reader.headers().ok()?;
+    let missing: Vec<&str> = NEEDED.into_iter().filter(|name| !header.iter().any(|column| column == *name)).collect();
+    (missing.len() > 1).then(|| {
+        let (needed, missing) = (NEEDED.join(", "), missing.join(", "));
+        format!("; a truth needs the columns {needed}, of which {missing} are missing")
+    })
 }
 
 /// Reads the results. They come before the truth, so that a wrong file in their place is named first.

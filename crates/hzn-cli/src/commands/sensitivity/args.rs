@@ -123,6 +123,8 @@ pub(super) enum Lens {
     /// r = f tan(angle), below 180 degrees
     Pinhole,
     /// r = f angle, up to 350 degrees
+    // `hzn init` calls this lens a fisheye.
+    #[value(alias = "fisheye")]
     Equidistant,
 }
 

@@ -164,7 +164,7 @@ impl<'a> Grid<'a> {
             depression_deg: value("depression_deg").unwrap_or(0.0),
             roll_deg: value("roll_deg").unwrap_or(0.0),
             sigma_px: noise(0.0).map_or(args.sigma_px.unwrap_or(1.0), |n| n.sigma_px),
-            correlation_px: positive("correlation-px", args.correlation_px.unwrap_or(300.0))?,
+            correlation_px: positive("correlation-px", args.correlation_px.unwrap_or(CORRELATION_PX))?,
         };
         if args.correlation_px.is_none() && sensor.is_some() {
             // The correlation length depends on the length of the edge.
@@ -174,6 +174,10 @@ impl<'a> Grid<'a> {
         Ok(design)
     }
 }
+
+/// Correlation length of the edge if nothing gives one, in pixels: that of the visible pictures of Braun & Barf 2022, which
+/// are 1920 px wide.
+pub(super) const CORRELATION_PX: f64 = 300.0;
 
 /// Reads a sensor.toml. A sensor that looks for several bodies is refused unless the command line names one.
 fn load(path: &Path, is_body_named: bool) -> Result<Config, Stop> {

@@ -4,7 +4,7 @@ use hzn_plot::{Chart, Series, Style};
 use hzn_sim::sensitivity::{Design, Sigmas};
 
 use super::args::Args;
-use super::grid::{Grid, combinations};
+use super::grid::{CORRELATION_PX, Grid, combinations};
 use super::study::Study;
 use super::table::Table;
 use crate::exit::Stop;
@@ -58,6 +58,7 @@ pub(super) fn compute(args: &Args) -> Result<Study, Stop> {
              horizontal; --depression {dip:.0} looks at it"
         ));
     }
+    notes.extend(small_picture(args, results.iter().filter_map(|(_, s)| s.as_ref()).map(|s| s.limb_px)));
     let best = |value: Pick| {
         let with = |(p, s): &(Vec<f64>, Option<Sigmas>)| Some((p.clone(), value(s.as_ref()?)?));
         results.iter().filter_map(with).min_by(|a, b| a.1.total_cmp(&b.1))
@@ -68,6 +69,19 @@ pub(super) fn compute(args: &Args) -> Result<Study, Stop> {
     }
     let chart = swept.first().map(|&x| chart(&grid, &results, x, &swept[1..]));
     Ok(Study { table, chart, notes })
+}
+
+/// Returns the note that the default errors are not those of a small picture, in which they shift the whole limb.
+fn small_picture(args: &Args, limbs_px: impl Iterator<Item = f64>) -> Option<String> {
+    let is_default = args.sensor.is_none() && args.correlation_px.is_none();
+    let shortest_px = limbs_px.filter(|_| is_default).fold(f64::INFINITY, f64::min);
+    (shortest_px < CORRELATION_PX).then(|| {
+        format!(
+            "the default errors of the edge are those of visible pictures 1920 px wide, correlated over {CORRELATION_PX} \
+             px. A limb of {shortest_px:.0} px is shifted as a whole by them. For a small picture, such as that of a \
+             thermal array, give --sigma-px and --correlation-px of the camera, or its --sensor"
+        )
+    })
 }
 
 /// Plots sigmas over the first quantity that varies. Every combination of the others has its own lines.
