@@ -53,8 +53,7 @@ pub fn load(path: &Path) -> Result<Sensor, Problem> {
     parse(&text, path)
 }
 
-/// Reads a sensor.toml as [`load`] does, but from text. `path` is used in messages, and the path of a camera `file` is
-/// relative to its folder.
+/// Reads a sensor.toml as [`load`] does, but from text. Messages name `path`; its folder is that of a camera `file`.
 ///
 /// # Errors
 /// The first error in the text.

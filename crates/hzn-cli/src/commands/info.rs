@@ -26,9 +26,9 @@ use crate::tell::{self, one_line};
 
 /// Say what a file is, and what it contains
 ///
-/// The file may be a folder of pictures, results (.mcap, .csv, .jsonl), a sensor.toml or camera file, a scene.toml, rig.toml, fuse.toml,
-/// frames.csv, truth.csv, imu.csv, gnss.csv, a picture, a video, the folder of a bag of ROS 2, a prepared sensor, a
-/// stream of packets, or a file of attitudes or orbits (AEM, OEM, SPICE).
+/// The file may be a folder of pictures, results (.mcap, .csv, .jsonl), a sensor.toml or camera file, a scene.toml,
+/// rig.toml, fuse.toml, frames.csv, truth.csv, imu.csv, gnss.csv, a picture, a video, the folder of a bag of ROS 2, a
+/// prepared sensor, a stream of packets, or a file of attitudes or orbits (AEM, OEM, SPICE).
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The file, or a folder of pictures
@@ -66,6 +66,10 @@ fn one_file(file: &Path) -> Result<Described, Stop> {
         _ if source::is_video(file) => other::video(file)?,
         _ => match kind_of_file::content::of_file(file) {
             Some(kind_of_file::content::CAMERA_FILE) => (sensor(file, &kind)?, None),
+            Some(kind_of_file::content::PREPARED) => {
+                let (out, config) = content::prepared_sensor(file)?;
+                (calibration(out, &config)?, None)
+            }
             Some(known) => (content::describe(file, known)?, None),
             None => (one_picture(file)?, None),
         },

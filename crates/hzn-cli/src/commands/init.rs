@@ -281,22 +281,32 @@ fn limb_fov(args: &Args, known: &CameraFacts) -> Result<Option<FieldOfView>, Sto
     match measure_field_of_view(&request(args), known)? {
         LimbSays::FieldOfView(found) => Ok(Some(found)),
         LimbSays::NoAltitude => Ok(None),
-        LimbSays::LensDecides(found) => Err(usage(format!(
+        LimbSays::LensDecides(found) if found.iter().any(FieldOfView::is_certain) => Err(usage(format!(
             "the field of view is not known (no --fov, no usable EXIF), and the limb says {}; add --lens fisheye or \
              --lens pinhole, more pictures, or the field of view over the whole width, for example --fov 60",
-            found.iter().map(|one| one.describe(known.size_px[0])).collect::<Vec<_>>().join(", but ")
+            in_words(&found, known)
         ))),
-        LimbSays::Uncertain(found) => Err(usage(format!(
-            "the field of view is not known (no --fov, no usable EXIF), and what the limb says is too uncertain to \
-             start from: {}; add more pictures, or the field of view over the whole width, for example --fov 60",
-            found.describe(known.size_px[0])
-        ))),
+        // The kind of the lens alone would be refused as well.
+        LimbSays::LensDecides(found) => Err(too_uncertain(&in_words(&found, known))),
+        LimbSays::Uncertain(found) => Err(too_uncertain(&in_words(&[found], known))),
         LimbSays::Nothing(pictures) => Err(usage(format!(
             "the field of view is not known (no --fov, no usable EXIF), and the limb in {} does not say it; \
              add the field of view over the whole width, for example --fov 60, and --lens fisheye or --lens pinhole",
             explain::counted(pictures as u64, "picture")
         ))),
     }
+}
+
+/// Returns fields of view in words.
+fn in_words(found: &[FieldOfView], known: &CameraFacts) -> String {
+    found.iter().map(|one| one.describe(known.size_px[0])).collect::<Vec<_>>().join(", but ")
+}
+
+fn too_uncertain(what: &str) -> Stop {
+    usage(format!(
+        "the field of view is not known (no --fov, no usable EXIF), and what the limb says is too uncertain to start \
+         from: {what}; add more pictures, or the field of view over the whole width, for example --fov 60"
+    ))
 }
 
 /// Collects what the pictures and the command line say about the camera.

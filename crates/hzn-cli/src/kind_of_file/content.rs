@@ -134,8 +134,8 @@ fn of_bytes(bytes: &[u8]) -> Option<Content> {
     known.or_else(|| of_packets(bytes)).or_else(|| of_text(bytes))
 }
 
-/// Returns what a stream of packets is. The first packet must be as `hzn_flight::packet` describes it, so that bytes of a
-/// picture are no packet by chance.
+/// Returns what a stream of packets is. The first packet must be as `hzn_flight::packet` describes it, so that bytes of
+/// a picture are no packet by chance.
 fn of_packets(bytes: &[u8]) -> Option<Content> {
     let is_packet = |window: &&[u8]| {
         let Some(&[first, _, flags, _, high, low]) = window.strip_prefix(&SYNC) else { return false };

@@ -98,8 +98,9 @@ fn a_dark_moon_before_the_corona_is_answered_and_no_edge_of_a_spacecraft() {
     let sensor = |height: u32, invert: bool| {
         let middle = f64::from(height - 1) * 0.5;
         format!(
-            "[camera]\nwidth = 1920\nheight = {height}\nmodel = \"pinhole\"\nfx_px = 7200\nfy_px = 7200\ncx_px = 959.5\n\
-             cy_px = {middle}\nfocal_sigma_percent = 2.0\n[input]\ninvert = {invert}\n[body]\nkind = \"sphere\"\n\
+            "[camera]\nwidth = 1920\nheight = {height}\nmodel = \"pinhole\"\nfx_px = 7200\nfy_px = 7200\n\
+             cx_px = 959.5\ncy_px = {middle}\nfocal_sigma_percent = 2.0\n[input]\ninvert = {invert}\n[body]\n\
+             kind = \"sphere\"\n\
              radius_km = 1737.4\naltitude_km = 42300\naltitude_sigma_km = 3000\nlimb_height_km = 0\n\
              limb_height_sigma_km = 5\n"
         )
@@ -167,7 +168,11 @@ fn exif_of_a_picture_that_was_made_smaller_gives_no_lens() {
         let args = ["init", picture.to_str().unwrap(), "--altitude", "40", "-o", "small.toml", "--force"];
         place.run(&[&args, more].concat())
     };
-    init(&[]).expect(2).says("the field of view is not known (no --fov, no usable EXIF)");
+    let uncertain = init(&[]).expect(2).err;
+    assert!(uncertain.contains("the field of view is not known (no --fov, no usable EXIF)"), "{uncertain}");
+    // The kind of the lens would not help, so that it is not asked for.
+    assert!(!uncertain.contains("--lens"), "{uncertain}");
+    init(&["--lens", "pinhole"]).expect(2).says("too uncertain to start from");
     assert!(!place.path("small.toml").exists());
     // Without an altitude the limb cannot say it either: the pitch itself is named.
     let refused = place.run(&["init", picture.to_str().unwrap(), "-o", "small.toml"]).expect(2);

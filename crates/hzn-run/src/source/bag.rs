@@ -54,8 +54,8 @@ pub fn recordings(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(files)
 }
 
-/// Returns what to do with a bag that hzn does not read: the commands that convert it. A bag of ROS 2 is converted by its
-/// folder, and ROS itself converts no bag of ROS 1.
+/// Returns what to do with a bag that hzn does not read: the commands that convert it. A bag of ROS 2 is converted by
+/// its folder, and ROS itself converts no bag of ROS 1.
 pub fn conversion(from: &Path) -> String {
     let folder = from.parent().filter(|folder| ending(from) == "db3" && !folder.as_os_str().is_empty());
     let bag = folder.unwrap_or(if ending(from) == "db3" { Path::new(".") } else { from });

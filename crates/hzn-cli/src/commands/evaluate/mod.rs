@@ -69,8 +69,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let Results { rows, sensor_toml, lost, .. } = read_results(&args.results)?;
     let truth_path = if args.truth.is_dir() { args.truth.join("truth.csv") } else { args.truth.clone() };
     let folder = truth_path.parent().unwrap_or(Path::new(""));
-    let truth = hzn_files::truth::load_directions(&truth_path)
-        .map_err(|e| usage(format!("{e}{}", missing_columns(&truth_path).unwrap_or_default())))?;
+    let truth = load_truth(&truth_path)?;
     let sensor_path = args.sensor.clone().unwrap_or_else(|| folder.join("sensor.toml"));
     let mut read = hzn_files::files_of_sensor(&sensor_path);
     read.extend([args.results.clone(), truth_path.clone()]);
@@ -119,6 +118,11 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     lost.iter().for_each(tell::warning);
     Ok(if lost.is_some() { Exit::SomeUnreadable } else { Exit::Done })
+}
+
+fn load_truth(path: &Path) -> Result<Vec<Truth>, Stop> {
+    let refuse = |e| usage(format!("{e}{}", missing_columns(path).unwrap_or_default()));
+    hzn_files::truth::load_directions(path).map_err(refuse)
 }
 
 /// Columns that a truth needs.

@@ -12,12 +12,16 @@ use super::facts::Facts;
 use crate::exit::{Stop, failed};
 use crate::kind_of_file::content::{Content, PREPARED, TELECOMMANDS, TELEMETRY};
 
-/// Describes a file whose content is known.
-pub(super) fn describe(file: &Path, known: Content) -> Result<Facts, Stop> {
+fn named(known: Content) -> Facts {
     let mut out = Facts::new(known.kind, known.what);
     out.line("for", known.command.to_owned());
+    out
+}
+
+/// Describes a file whose content is known.
+pub(super) fn describe(file: &Path, known: Content) -> Result<Facts, Stop> {
+    let mut out = named(known);
     match known {
-        PREPARED => return prepared_sensor(out, file),
         TELEMETRY | TELECOMMANDS => {
             let bytes = read(file, limited::TABLE_BYTES)?;
             let packets = bytes.windows(SYNC.len()).filter(|window| *window == SYNC).count();
@@ -38,8 +42,9 @@ const VERSION: usize = 6;
 const NUMBER_BYTES: usize = 7;
 const CHECKSUM: std::ops::Range<usize> = 16..20;
 
-/// Describes a prepared sensor. Bytes that this program refuses are described as far as their header goes.
-fn prepared_sensor(mut out: Facts, file: &Path) -> Result<Facts, Stop> {
+/// Describes a prepared sensor, and returns its configuration for the description of its camera.
+pub(super) fn prepared_sensor(file: &Path) -> Result<(Facts, Config), Stop> {
+    let mut out = named(PREPARED);
     // A page of flash may be larger than the sensor at its beginning.
     let bytes = read(file, limited::SETTINGS_BYTES)?;
     let byte = |place: usize| bytes.get(place).copied().unwrap_or_default();
@@ -60,7 +65,7 @@ fn prepared_sensor(mut out: Facts, file: &Path) -> Result<Facts, Stop> {
         };
         out.line("altitude", format!("{} ({})", altitude, body.kind.name()));
     }
-    super::calibration(out, &config)
+    Ok((out, config))
 }
 
 fn config_of<T: Real>(bytes: &[u8]) -> Result<Config, prepared::PreparedError> {

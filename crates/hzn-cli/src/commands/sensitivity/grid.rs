@@ -175,8 +175,8 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// Correlation length of the edge if nothing gives one, in pixels: that of the visible pictures of Braun & Barf 2022, which
-/// are 1920 px wide.
+/// Correlation length of the edge if nothing gives one, in pixels: that of the visible pictures of Braun & Barf 2022,
+/// which are 1920 px wide.
 pub(super) const CORRELATION_PX: f64 = 300.0;
 
 /// Reads a sensor.toml. A sensor that looks for several bodies is refused unless the command line names one.
