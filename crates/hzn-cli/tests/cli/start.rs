@@ -302,14 +302,23 @@ fn the_limb_gives_the_field_of_view() {
     }
 }
 
-/// A limb that is almost straight fits a pinhole and a narrower fisheye. One picture does not tell which is right.
+/// A limb that is almost straight fits a pinhole and a narrower fisheye. One picture does not tell which is right. The
+/// kind of the lens is asked for if it helps.
 #[test]
 fn a_limb_that_fits_two_kinds_of_lens_asks_for_the_kind() {
-    let place = Place::new();
     let lens = Lens { name: "pinhole", guess: "pinhole", fov_deg: 70.0, k: &[0.0, 0.0] };
-    Flight { frames: 1, altitude_km: 150.0, ..Flight::new(&lens) }.render(&place);
-    place.run(&["init", "flight", "-o", "f.toml"]).expect(2).says("--lens fisheye or --lens pinhole");
-    assert!(!place.path("f.toml").exists());
+    for altitude_km in [150.0, 250.0, 400.0] {
+        let place = Place::new();
+        Flight { frames: 1, altitude_km, ..Flight::new(&lens) }.render(&place);
+        let told = place.run(&["init", "flight", "-o", "f.toml"]);
+        let helps = ["fisheye", "pinhole"]
+            .map(|kind| place.run(&["init", "flight", "--lens", kind, "-o", &format!("{kind}.toml")]).code == 0);
+        println!("{altitude_km} km: {helps:?}, {}", told.err);
+        assert_eq!(place.path("f.toml").exists(), told.code == 0);
+        let asks = told.err.contains("--lens fisheye or --lens pinhole");
+        assert_eq!(asks, told.code == 2 && helps.contains(&true), "{altitude_km} km: {helps:?}, {}", told.err);
+        assert!(altitude_km > 150.0 || told.code == 2 && told.err.contains("as a fisheye, but "), "{}", told.err);
+    }
 }
 
 #[test]
