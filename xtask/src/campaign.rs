@@ -49,8 +49,8 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
   cuts  cuts the power after each step of runs of PICTURES (12) pictures
   flights
         fuses FLIGHTS (200) right flights, and every wrong input on a twentieth of them
-  fly   gives PICTURES (36000) pictures of 1920x1080 to hzn fly, 60 a second, with a real-time priority where the machine
-        allows it, and prints the time from the last byte of a picture to its packet
+  fly   gives PICTURES (36000) pictures of 1920x1080 to hzn fly, 60 a second, with a real-time priority where the
+        machine allows it, and prints the time from the last byte of a picture to its packet
   long  processes PICTURES (100000) with hzn run, and ten times as many in one process
   flips flips TRIALS (20000) bits of pictures and of stored parameters, sticks as many pictures, and flips every bit
         of a sensor in memory
@@ -63,8 +63,8 @@ const USAGE: &str = "usage: cargo xtask campaign fuzz [--seconds N] [--keep] [TA
         of its own, from SEED (700000) on, and counts errors above protection_deg
   night renders PICTURES (300) pictures of layers of airglow of each kind, from SEED (810000) on, and as many limbs by
         day with a wrong time and edges that are no limb, and counts the answers of body.night = \"airglow\"
-  means simulates FLIGHTS (20) flights of 100 pictures in ten seconds, of each of five scenes, from SEED (910000) on, and
-        prints the NEES of means of 3, 10 and 100 answers, and the errors beside those of the preset dlr-2022
+  means simulates FLIGHTS (20) flights of 100 pictures in ten seconds, of each of five scenes, from SEED (930000) on,
+        and prints the NEES of means of 3, 10 and 100 answers, and the errors beside those of the preset dlr-2022
   rig   counts the errors of the coarse direction of a rig from ATTITUDES (1000) random attitudes, and those of the
         mounts that hzn calibrate rig finds on FLIGHTS (300) flights
   check renders FLIGHTS (100) small flights of four kinds from SEED (910000) on, and counts what hzn calibrate check
@@ -106,7 +106,7 @@ pub(crate) fn run(args: &[String]) -> Result<(), String> {
             integrity(number(200)?, number_at(2, 700_000)?, states).map_err(Trouble::into_message)
         }
         Some("night") => night(number(300)?, number_at(2, 810_000)?).map_err(Trouble::into_message),
-        Some("means") => means(number(20)?, number_at(2, 910_000)?).map_err(Trouble::into_message),
+        Some("means") => means(number(20)?, number_at(2, 930_000)?).map_err(Trouble::into_message),
         Some("rig") => rig(number(1000)?, number_at(2, 300)?).map_err(Trouble::into_message),
         Some("check") => check(number(100)?, number_at(2, 910_000)?).map_err(Trouble::into_message),
         Some("processors") => processors::compare(number(2000)?).map_err(Trouble::into_message),
