@@ -320,4 +320,14 @@ fn the_default_errors_of_a_small_picture_are_doubted() {
     assert!(!own.err.contains("default errors"), "{}", own.err);
     let large = place.run(&["sensitivity", "--fov", "90", "--altitude", "500"]).expect(0);
     assert!(!large.err.contains("default errors"), "{}", large.err);
+    // A camera buyer who gives only the data sheet of an array sees the sigmas that its pictures will have.
+    place.run(&["simulate", "thermal-array", "--frames", "12", "--no-noise", "-o", "scene", "-q"]).expect(0);
+    place.run(&["run", "scene", "-o", "rows.csv", "-q"]).expect(0);
+    let mut sigmas: Vec<f64> =
+        place.rows("rows.csv").iter().filter_map(|row| cell(row, "sigma_max_deg").parse().ok()).collect();
+    sigmas.sort_by(f64::total_cmp);
+    place.run(&[&array[..], &["--depression", "22", "-o", "s.csv"]].concat()).expect(0);
+    let predicted: f64 = cell(&place.rows("s.csv")[0], "sigma_max_deg").parse().unwrap();
+    let ratio = predicted / sigmas[sigmas.len() / 2];
+    assert!((0.5..2.0).contains(&ratio), "{predicted} of {sigmas:?}");
 }

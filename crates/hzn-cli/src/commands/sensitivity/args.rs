@@ -88,11 +88,12 @@ pub(crate) struct Args {
     /// point below the vehicle, over the root of two]
     #[arg(long, value_name = "KM")]
     pub(super) tilt_sigma: Option<f64>,
-    /// 1-sigma of an edge point, pixels [default: 1]; with `--sensor` and `noise = "rms"` the RMS of the residuals
-    /// [default: that of the simulated scene next to the sensor.toml]
+    /// 1-sigma of an edge point, pixels [default: 1, the same angle in pixels wider than 0.6°]; with `--sensor` and
+    /// `noise = "rms"` the RMS of the residuals [default: that of the simulated scene next to the sensor.toml]
     #[arg(long, value_name = "PX")]
     pub(super) sigma_px: Option<f64>,
-    /// Correlation length of the errors along the edge, pixels [default: 300; with `--sensor` that of the sensor]
+    /// Correlation length of the errors along the edge, pixels [default: 300, the same angle in pixels wider than
+    /// 0.6°; with `--sensor` that of the sensor]
     #[arg(long, value_name = "PX")]
     pub(super) correlation_px: Option<f64>,
     /// Also write the table (.csv) or a plot over the first range (.svg); may be given twice

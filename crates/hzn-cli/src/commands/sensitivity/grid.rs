@@ -5,6 +5,7 @@ use std::path::Path;
 use hzn_core::Config;
 use hzn_core::body::Kind;
 use hzn_core::camera::{self, Model};
+use hzn_core::edge_noise;
 use hzn_sim::sensitivity::{Design, SensorPlace, Sigmas};
 
 use super::args::{Args, Lens, Size, What};
@@ -154,6 +155,7 @@ impl<'a> Grid<'a> {
         let own_sigma = own.map_or(body.limb_height_sigma_km, |b| b.limb_height_sigma_km);
         let altitude_sigma = args.altitude_sigma.or(own.map(|b| b.altitude_sigma_km)).unwrap_or(0.5);
         let noise = |limb_px: f64| sensor.map(|(s, noise)| noise_of(s).measured(noise.rms_px, limb_px));
+        let part = part_in_wide_pixels(&camera);
         let mut design = Design {
             camera,
             radius_km: body.radius_km,
@@ -163,8 +165,8 @@ impl<'a> Grid<'a> {
             limb_height_sigma_km: positive("limb-height-sigma", args.limb_height_sigma.unwrap_or(own_sigma))?,
             depression_deg: value("depression_deg").unwrap_or(0.0),
             roll_deg: value("roll_deg").unwrap_or(0.0),
-            sigma_px: noise(0.0).map_or(args.sigma_px.unwrap_or(1.0), |n| n.sigma_px),
-            correlation_px: positive("correlation-px", args.correlation_px.unwrap_or(CORRELATION_PX))?,
+            sigma_px: noise(0.0).map_or(args.sigma_px.unwrap_or(SIGMA_PX * part), |n| n.sigma_px),
+            correlation_px: positive("correlation-px", args.correlation_px.unwrap_or(CORRELATION_PX * part))?,
         };
         if args.correlation_px.is_none() && sensor.is_some() {
             // The correlation length depends on the length of the edge.
@@ -174,6 +176,16 @@ impl<'a> Grid<'a> {
         Ok(design)
     }
 }
+
+/// Returns the part of the default errors that a camera with wide pixels has: there they keep their angle, as the
+/// default errors of a sensor do.
+fn part_in_wide_pixels(camera: &camera::Config) -> f64 {
+    let here = edge_noise::Config::for_focal_length(0.5 * (camera.fx_px + camera.fy_px));
+    here.correlation_px / edge_noise::Config::default().correlation_px
+}
+
+/// Sigma of an edge point if nothing gives one, in pixels.
+const SIGMA_PX: f64 = 1.0;
 
 /// Correlation length of the edge if nothing gives one, in pixels: that of the visible pictures of Braun & Barf 2022,
 /// which are 1920 px wide.
