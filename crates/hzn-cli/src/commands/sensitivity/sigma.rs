@@ -77,8 +77,8 @@ fn small_picture(args: &Args, limbs_px: impl Iterator<Item = f64>) -> Option<Str
     let shortest_px = limbs_px.filter(|_| is_default).fold(f64::INFINITY, f64::min);
     (shortest_px < CORRELATION_PX).then(|| {
         format!(
-            "the default errors of the edge are those of visible pictures 1920 px wide. A limb of {shortest_px:.0} px is \
-             shifted as a whole by them. For a small picture, such as that of a thermal array, give --sigma-px and \
+            "the default errors of the edge are those of visible pictures 1920 px wide. A limb of {shortest_px:.0} px \
+             is shifted as a whole by them. For a small picture, such as that of a thermal array, give --sigma-px and \
              --correlation-px of the camera, or its --sensor"
         )
     })
