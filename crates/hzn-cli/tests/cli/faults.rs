@@ -77,6 +77,7 @@ fn a_second_run_is_told_about_the_first() {
         let live = hzn_mcap::create_part(&place.path(&format!("{out}.part"))).unwrap();
         place.run(&["run", "in", "-o", out]).expect(2).says("another run is writing it");
         drop(live);
+        crate::common::wait_until_free(&place.path(&format!("{out}.part")));
         place.run(&["run", "in", "-o", out]).expect(2).says("was left by a run that did not end");
     }
 }

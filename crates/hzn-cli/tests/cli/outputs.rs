@@ -1,6 +1,6 @@
 //! An output replaces no file without the user's consent.
 
-use crate::common::Place;
+use crate::common::{Place, wait_until_free};
 
 /// Returns the beginning of an MCAP of another program.
 fn foreign() -> Vec<u8> {
@@ -66,6 +66,7 @@ fn one_run_at_a_time_writes_a_file() {
         }
         // After its process has ended, the lock on the file is free.
         drop(other);
+        wait_until_free(&part);
         place.run(&["run", "in", "-o", out, "--force"]).expect(0);
     }
 }

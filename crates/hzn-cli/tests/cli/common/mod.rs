@@ -51,6 +51,16 @@ pub fn assert_provenance(page: &str, has_sensor: bool, command: &str) {
     assert!(rest.contains(&format!("<code>{command}")), "{rest}");
 }
 
+/// Waits until no process has the lock of a file. A process that another test is just starting has it, too, until its
+/// program begins.
+pub fn wait_until_free(part: &std::path::Path) {
+    let end = std::time::Instant::now() + std::time::Duration::from_secs(20);
+    while hzn_mcap::create_part(part).is_err() {
+        assert!(std::time::Instant::now() < end, "{} stays locked", part.display());
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+}
+
 /// Returns the checksum of PNG.
 pub fn crc32(data: &[u8]) -> u32 {
     let step = |crc: u32, byte: &u8| {
