@@ -271,7 +271,7 @@ pub fn chain_sensor() -> Config {
     config
 }
 
-/// Returns [`chain_sensor`] as [`page`].
+/// Returns [`chain_sensor`] as it is prepared, with zeros behind it, and its length in bytes.
 ///
 /// # Panics
 /// Panics if the configuration is refused.

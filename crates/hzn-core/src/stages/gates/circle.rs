@@ -7,11 +7,11 @@ use crate::base::linalg::{V3, invert_spd3};
 use crate::base::real::Real;
 use crate::model::verdict::Verdict;
 
-/// Refuses an edge whose points fit a circle of the image better than the cone.
-pub(super) fn refuse<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>) -> Result<(), Verdict> {
+/// Refuses an edge whose points fit a circle of the image better than the cone. `floor_px` is the floor of the noise.
+pub(super) fn refuse<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>, floor_px: T) -> Result<(), Verdict> {
     // Cone and circle have the same number of parameters.
     let is_circle = || rms(residuals.shape).is_some_and(|rival_px| residuals.prefer(rival_px, T::ZERO));
-    refuse_if(residuals.allow_rival() && is_told(case, residuals) && is_circle(), Verdict::Circle)
+    refuse_if(residuals.allow_rival() && is_told(case, residuals, floor_px) && is_circle(), Verdict::Circle)
 }
 
 /// Returns whether the edge is large enough to be told from a circle.
@@ -19,9 +19,8 @@ pub(super) fn refuse<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>) 
 /// A small disc is an ellipse that differs little from a circle: by R θ²/4 pixels at an angle θ off the axis. Blur that
 /// is not round, which every lens has away from its axis, makes a circle an ellipse as well, and an ellipse a circle.
 /// Below the floor of the residuals, the outline of a small disc therefore says nothing.
-fn is_told<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>) -> bool {
-    let floor_px = T::from_f64(case.config.residual_floor_px * case.config.max_rival_ratio);
-    !(radius_px(case) < T::from_f64(FULL_RADIUS_PX)) || residuals.rms_px > floor_px
+fn is_told<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>, floor_px: T) -> bool {
+    !(radius_px(case) < T::from_f64(FULL_RADIUS_PX)) || residuals.exceed(floor_px)
 }
 
 /// Number of Gauss-Newton steps. Two are enough from a circle through three of the points.

@@ -10,14 +10,14 @@ use crate::model::verdict::Verdict;
 /// fitted together with the parameters of the lens; the half-angle must then be the expected one, too.
 // The second fit is done only if its result matters, so that other edges do not pay for it.
 pub(super) fn refuse<T: Real>(case: &Case<'_, T>, residuals: &mut Residuals<'_, T>) -> Result<(), Verdict> {
-    let exact = compare(case, residuals);
+    let [floor_px, chi] = [case.config.residual_floor_px, case.config.max_half_angle_sigma].map(T::from_f64);
+    let exact = compare(case, residuals, floor_px);
     if exact.is_ok() && !lens::explains_half_angle(case) {
         return Ok(());
     }
-    let [floor_px, chi] = [case.config.residual_floor_px, case.config.max_half_angle_sigma].map(T::from_f64);
     let second = lens::without_lens(case, residuals, |bend, bent| {
         if exact.is_err() {
-            compare(case, &bent.with_bend(bend.chi2, floor_px, T::from_f64(lens::INDEPENDENT)))?;
+            compare(case, &bent.with_bend(bend.chi2, floor_px, T::from_f64(lens::INDEPENDENT)), floor_px)?;
         }
         refuse_if(bend.half_angle_chi2 > chi * chi, Verdict::HalfAngle)
     });
@@ -25,9 +25,9 @@ pub(super) fn refuse<T: Real>(case: &Case<'_, T>, residuals: &mut Residuals<'_, 
 }
 
 #[inline(never)]
-fn compare<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>) -> Result<(), Verdict> {
+fn compare<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>, floor_px: T) -> Result<(), Verdict> {
     straight::refuse(residuals)?;
     any_cone::refuse(case, residuals)?;
-    circle::refuse(case, residuals)?;
+    circle::refuse(case, residuals, floor_px)?;
     polyline::refuse(residuals)
 }

@@ -116,7 +116,12 @@ impl<'a, T: Real> Residuals<'a, T> {
 
     /// Returns whether the residuals are larger than noise.
     pub(super) fn exceed_noise(&self) -> bool {
-        self.rms_px > self.max_ratio * self.noise_px.max(self.floor_px)
+        self.exceed(self.noise_px.max(self.floor_px))
+    }
+
+    /// Returns whether the residuals are larger than those of a noise by more than the largest ratio.
+    pub(super) fn exceed(&self, noise_px: T) -> bool {
+        self.rms_px > self.max_ratio * noise_px
     }
 
     /// Returns whether some other curve may fit better. No smooth curve can fit better than the noise from point to
