@@ -23,8 +23,8 @@ pub(crate) fn result(text: impl Display) -> io::Result<()> {
     bytes(lines(text).as_bytes())
 }
 
-/// Prints a report beside which a command writes files or decides its exit code. A reader that has read enough
-/// (`hzn calibrate sky ... | head`) must not cost them, so the work then goes on.
+/// Prints the report of a command that also writes files or has a verdict as its exit code. If the reader stops
+/// (`hzn calibrate sky ... | head`), the work goes on, so that files and exit code stay the same.
 ///
 /// # Errors
 /// The disk of stdout is full.

@@ -201,5 +201,6 @@ fn limb_and_sun_follow_each_other() {
     place.write("by-sun-limb.toml", place.read("by-sun.toml").replace("kind = \"sun\"", "").as_bytes());
     let after = sky("flight", "by-sun-limb.toml", "no.toml").expect(1);
     let [[_, before_km], [_, after_km]] = [&alone.out, &after.out].map(|report| number(report, "limb height    "));
+    println!("{}\n{}\n{}", alone.out, both.out, after.out);
     assert!(after_km < 0.7 * before_km, "{before_km} {after_km}");
 }
