@@ -138,7 +138,9 @@ fn long(pictures: u64) -> Outcome {
 
 /// Flies with pictures that come in real time.
 fn fly(pictures: u64) -> Outcome {
+    steps::run(&mut cargo(&["build", "--release", "--bin", "hzn"]))?;
     let mut campaign = test("cli", "fly_long::");
+    campaign.env("HZN_FLY_PROGRAM", target().join("release/hzn"));
     campaign.env("HZN_FLY_PICTURES", pictures.to_string());
     if machine::run_within(Command::new("chrt").args(["-f", "50", "true"]), Duration::from_secs(5)) {
         campaign.env("HZN_FLY_PRIORITY", "50");

@@ -57,7 +57,7 @@ record! {
         axis: [f32; 3],
         /// Covariance of `axis`, rad².
         cov: [f32; 6],
-        /// The part of `cov` that the next epoch shares, rad²; NaN with several heads.
+        /// The part of `cov` that the next epoch shares, rad²; NaN if it is not known of a head.
         cov_common: [f32; 6],
         /// Half-angle of the limb, rad.
         half_angle_rad: f32,

@@ -58,7 +58,23 @@ impl Noise {
     }
 }
 
-/// The variable `HZN_FLY_PICTURES` gives a number of pictures of 1920×1080 in place of a few small ones, and
+/// Returns the command with the program and the priority that the environment names.
+fn as_flown(ours: &Command) -> Command {
+    let program = std::env::var_os("HZN_FLY_PROGRAM").unwrap_or_else(|| ours.get_program().to_owned());
+    let mut command = match std::env::var("HZN_FLY_PRIORITY") {
+        Ok(priority) => {
+            let mut with_priority = Command::new("chrt");
+            with_priority.args(["-f", &priority]).arg(program);
+            with_priority
+        }
+        Err(_) => Command::new(program),
+    };
+    command.args(ours.get_args()).current_dir(ours.get_current_dir().unwrap());
+    command
+}
+
+/// The variable `HZN_FLY_PICTURES` gives a number of pictures of 1920×1080 in place of a few small ones,
+/// `HZN_FLY_PROGRAM` the program that flies, because that of the tests is not optimised as a released one is, and
 /// `HZN_FLY_PRIORITY` a real-time priority, which the machine must allow.
 #[test]
 fn a_flight_of_many_pictures_tells_no_fault() {
@@ -71,14 +87,8 @@ fn a_flight_of_many_pictures_tells_no_fault() {
     let count = many.unwrap_or(180);
     let port = free_port();
     let (listen, connect) = (format!("tcp-listen:127.0.0.1:{port}"), format!("tcp:127.0.0.1:{port}"));
-    let mut command = place.command(&["fly", "-", "-s", sensor, "--line", &listen, "--state", "state"]);
-    if let Ok(priority) = std::env::var("HZN_FLY_PRIORITY") {
-        let mut with_priority = Command::new("chrt");
-        with_priority.args(["-f", &priority]).arg(command.get_program()).args(command.get_args());
-        with_priority.current_dir(command.get_current_dir().unwrap());
-        command = with_priority;
-    }
-    let mut flight = Running::start(command);
+    let ours = place.command(&["fly", "-", "-s", sensor, "--line", &listen, "--state", "state"]);
+    let mut flight = Running::start(as_flown(&ours));
     flight.wait_for("flight mode");
     let mut ground = Running::start(place.command(&["telemetry", &connect, "-o", "sent.csv", "--send", "report"]));
     ground.wait_for("report: done");
