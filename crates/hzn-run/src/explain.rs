@@ -166,6 +166,7 @@ pub fn term_text(term: Term) -> &'static str {
         Term::CommonTilt => "a tilt that the whole edge shares",
         Term::CommonBend => "a bend that the whole edge shares",
         Term::UnknownAzimuth => "the limb's unknown azimuth",
+        Term::Weather => "the weather along the limb",
         Term::Lens => "the calibration of the lens",
         Term::LimbTilt => "a tilt of the limb",
         Term::LowSun => "the low Sun",

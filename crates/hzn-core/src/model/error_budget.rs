@@ -27,19 +27,21 @@ pub enum Term {
     LimbTilt = 6,
     /// A Sun that is low over a part of the limb, which raises the edge there. The weights of the fusion leave it out.
     LowSun = 7,
+    /// The weather of a thermal band, which changes the height along the limb.
+    Weather = 8,
     /// The height of the limb, through the expected half-angle.
-    LimbHeight = 8,
+    LimbHeight = 9,
     /// The altitude, through the expected half-angle.
-    Altitude = 9,
+    Altitude = 10,
     /// The local radius of the body, through the expected half-angle.
-    Radius = 10,
+    Radius = 11,
     /// The height of a limb that is clipped at full scale, through the expected half-angle.
-    Clipping = 11,
+    Clipping = 12,
 }
 
 impl Term {
     /// All terms in the order of their numbers.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::EdgeNoise,
         Self::CommonShift,
         Self::CommonTilt,
@@ -48,6 +50,7 @@ impl Term {
         Self::Lens,
         Self::LimbTilt,
         Self::LowSun,
+        Self::Weather,
         Self::LimbHeight,
         Self::Altitude,
         Self::Radius,
@@ -56,7 +59,7 @@ impl Term {
 }
 
 /// Number of terms that are known before the expected half-angle is fused. The other terms come from the fusion.
-const FIT_TERMS: usize = 8;
+const FIT_TERMS: usize = 9;
 
 /// The covariance of an answer's axis, term by term. The sum of the terms is the whole covariance.
 #[derive(Debug, Clone, Copy)]

@@ -7,6 +7,7 @@
 use super::band_table::CO2_HEIGHTS;
 use super::{Config, Kind, Limb};
 use crate::base::error::{ConfigError, Limit, require};
+use crate::base::real::Real;
 
 /// 1-sigma of the height in the band of CO₂ that all of the limb shares, kilometres.
 // Two parts are independent. The filter: pass bands from 13.7 to 16.3 µm and from 14.5 to 15.5 µm put the limb 1.7 km
@@ -20,16 +21,18 @@ const WEATHER_KM: f64 = 1.5;
 const CO2_CLIMATE_KM: f64 = 1.1;
 /// Mean of the table over months and over the area of the Earth, kilometres.
 const CO2_MEAN_KM: f64 = 40.0;
-/// 1-sigma amplitude of each of the first two harmonics of the weather along the limb, kilometres.
-// Weather with the correlation exp(−d²/2L²), L = 1000 km, has the harmonics 2 σ √(exp(−κ) I_k(κ)) along a limb of the
-// radius ρ, κ = (ρ/L)². For 600 km of altitude ρ is 2600 km, so that they are 1.1 and 1.0 km. From far away they are
-// smaller, and from a lower orbit the first one is at most 1.3 km.
-const WEATHER_HARMONIC_KM: f64 = 1.1;
 /// Height of the limb from 8 to 14 µm, and its 1-sigma, kilometres.
 // No published value was found. The tops of clouds are the limb where there are clouds: the tropopause is at 8 km at
 // the poles and at 17 km at the equator. Without them water vapour ends at about 6 km, and ozone shines at 20 to 40 km
 // in a sixth of the band. Two sigmas reach from the ground to 26 km.
 const WINDOW_KM: [f64; 2] = [12.0, 7.0];
+/// Part of this sigma that is weather, 1/√2.
+// How much of the 7 km is the same along the whole limb is not known, so that half of the variance is. These 4.9 km are
+// more than the 3.2 km of heights that are evenly distributed from clear air (6 km) to the tropopause (17 km), and leave
+// room for ozone.
+const WINDOW_WEATHER: f64 = core::f64::consts::FRAC_1_SQRT_2;
+/// Length of the weather, metres: that of the heads of a rig, see `limb_own_length_km` there.
+const WEATHER_LENGTH_M: f64 = 1e6;
 
 /// Returns the part of the year that has passed at a time, 0 to 1, for [`Prior::year_part`](super::Prior::year_part).
 /// `days` are counted from the beginning of 1970.
@@ -98,10 +101,26 @@ impl Config {
         if is_default && is_placed { libm::sqrt(CO2_COMMON_KM * CO2_COMMON_KM + WEATHER_KM * WEATHER_KM) } else { told }
     }
 
-    /// Returns the 1-sigma amplitude of each of the first two harmonics of the limb height along the limb that the
-    /// weather of a thermal band has, kilometres. [`Self::tilt_sigma_m`] has the climate.
-    pub(super) fn weather_harmonic_km(&self) -> f64 {
-        if self.limb.thermal_km().is_some() { WEATHER_HARMONIC_KM } else { 0.0 }
+    /// Returns the 1-sigma of the weather along the limb of a thermal band, kilometres; 0 for another limb.
+    /// [`Self::tilt_sigma_m`] has the climate.
+    pub(super) fn weather_km(&self) -> f64 {
+        match self.limb {
+            Limb::Co2 => WEATHER_KM.min(self.limb_height_sigma_km),
+            Limb::Window => WINDOW_WEATHER * self.limb_height_sigma_km,
+            Limb::Visible | Limb::Height => 0.0,
+        }
+    }
+
+    /// Returns the 1-sigma of the mean height along a limb of this radius in metres, and that of the weather, metres.
+    pub(super) fn limb_sigmas_m<T: Real>(&self, is_placed: bool, radius_m: T) -> [T; 2] {
+        let km = T::from_f64(1000.0);
+        let [local, weather] = [self.limb_sigma_km(is_placed), self.weather_km()].map(|sigma| T::from_f64(sigma) * km);
+        if !(weather > T::ZERO) {
+            return [local, T::ZERO];
+        }
+        // The sigma is that of the height at one place. What changes along the limb has a term of its own.
+        let along = weather * weather * (T::one() - weather_mean_part(weather_kappa(radius_m)));
+        [(local * local - along).max(T::ZERO).sqrt(), weather]
     }
 
     /// Returns the height in kilometres from the table of the band at a geodetic latitude in degrees; the mean over the
@@ -122,6 +141,18 @@ impl Config {
         let (low, high) = (row(before as usize), row(before as usize + 1));
         Some(low + (high - low) * (months - before))
     }
+}
+
+/// Returns the square of the radius of a limb over the length of the weather.
+pub(super) fn weather_kappa<T: Real>(radius_m: T) -> T {
+    let lengths = radius_m * T::from_f64(1.0 / WEATHER_LENGTH_M);
+    (lengths * lengths).max(T::from_f64(1e-3))
+}
+
+/// Returns the part of the variance of the weather that the mean along the whole limb has: exp(−κ) I₀(κ), close to
+/// 1/√(2πκ).
+pub(super) fn weather_mean_part<T: Real>(kappa: T) -> T {
+    T::one() / (kappa * T::from_f64(core::f64::consts::TAU)).max(T::one()).sqrt()
 }
 
 /// Returns the height in kilometres at a place between two columns.
@@ -186,18 +217,24 @@ mod tests {
         let both = expect(Prior { position_m: Some(place), year_part: Some(0.5 / 12.0), ..Prior::default() });
         let where_only = expect(Prior { position_m: Some(place), ..Prior::default() });
         let neither = expect(Prior { altitude_m: Some(600e3), ..Prior::default() });
+        // The mean along the limb has 0.15 of the variance of the weather; the rest is along the limb.
+        let local = |e: &Expected<f64>| {
+            let along = 1.0 - weather_mean_part(e.weather_kappa());
+            (e.limb_sigma_parts_m[0].powi(2) + e.weather_m.powi(2) * along).sqrt()
+        };
         let sigma = |e: &Expected<f64>| e.limb_sigma_parts_m[0];
-        assert!((sigma(&both) - 2193.0).abs() < 1.0 && (sigma(&neither) - 2454.0).abs() < 1.0);
-        assert_eq!(sigma(&where_only), sigma(&neither));
+        assert!((local(&both) - 2193.0).abs() < 1.0 && (local(&neither) - 2454.0).abs() < 1.0);
+        assert!((1650.0..1750.0).contains(&sigma(&both)), "{}", sigma(&both));
+        assert!((local(&where_only) - local(&neither)).abs() < 1e-6);
         assert!((neither.limb_m - 40e3).abs() < 1e-6);
         // Over the north pole the limb is that of 66° north in every direction.
         assert!((both.limb_m - body.band_height_km(66.0, Some(0.5 / 12.0)).unwrap() * 1e3).abs() < 400.0);
         assert!(both.tilt_sigma_m < neither.tilt_sigma_m);
-        assert!(both.unknown_harmonics_cos[1] > 0.0);
-        // A told sigma stays.
+        assert_eq!(both.weather_m, 1500.0);
+        // A told sigma stays that of the height at one place.
         let told = Config { limb_height_sigma_km: 4.0, ..co2() };
         let told = Expected::<f64>::new(&told, &Prior { position_m: Some(place), ..Prior::default() }).unwrap();
-        assert_eq!(sigma(&told), 4000.0);
+        assert!((local(&told) - 4000.0).abs() < 1e-9 && told.weather_m == 1500.0);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use crate::geometry::ellipsoid::LimbCone;
 use crate::geometry::frames::{Cam, Fixed, Rotation, UnitVec3};
 
 use super::apparent::{ApparentBody, below_limb_error};
+use super::band;
 use super::position::Target;
 use super::{Config, Kind, LOWEST_ALTITUDE_M, Last, Night, Prior, PriorError};
 
@@ -62,6 +63,9 @@ pub struct Expected<T> {
     pub(crate) unknown_harmonics_cos: [T; 2],
     /// 1-sigma of a tilt of the limb along each of two axes, metres.
     pub(crate) tilt_sigma_m: T,
+    /// 1-sigma of the weather of a thermal band along the limb, metres. The limb height has its mean; what changes
+    /// along the limb comes on top.
+    pub(crate) weather_m: T,
     /// Threshold that the previous picture proposes, counts.
     pub(crate) level: Option<u16>,
     /// Direction to the Sun in the camera frame, if only the sunlit limb of the body counts as limb.
@@ -223,7 +227,6 @@ impl<T: Real> Expected<T> {
     // sigma are kept apart, because clipping adds its own later and `hzn explain` prints each of them.
     fn of_limb(body: &Config, prior: &Prior<T>, attitude_sigma: T) -> Result<Self, PriorError> {
         let (km, is_placed) = (T::from_f64(1000.0), prior.is_placed());
-        let limb_sigma = T::from_f64(body.limb_sigma_km(is_placed)) * km;
         let seen = ApparentBody::new(body, prior)?;
         let ApparentBody { sin, limb, .. } = seen;
         let cos2 = T::one() - sin * sin;
@@ -231,6 +234,7 @@ impl<T: Real> Expected<T> {
             return Err(below_limb_error(seen.altitude, limb));
         }
         let (cos, free) = (cos2.sqrt(), body.half_angle_is_free());
+        let [limb_sigma, weather_m] = body.limb_sigmas_m(is_placed, (seen.radius + limb) * cos);
         let altitude_sigma = if free { T::zero() } else { T::from_f64(body.altitude_sigma_km) * km };
         let (scale, known) = (sin / cos / (seen.radius + seen.altitude), useful_attitude(prior, attitude_sigma));
         let harmonics_cos = seen.harmonics.map(|h| -scale * h);
@@ -238,11 +242,8 @@ impl<T: Real> Expected<T> {
         // An attitude error ψ leaves k ψ of the k-th harmonic.
         let left = |k: f64| known.map_or(T::one(), |_| (attitude_sigma * T::from_f64(k)).min(T::one()));
         let uneven = |k: f64, amplitude: T| amplitude.abs() * left(k);
-        let weather = T::from_f64(body.weather_harmonic_km()) * km * scale;
-        let unknown_harmonics_cos = [
-            uneven(1.0, harmonics_cos[0]) + weather,
-            uneven(2.0, own + harmonics_cos[1]) + scale * seen.unknown_second_m + weather,
-        ];
+        let unknown_harmonics_cos =
+            [uneven(1.0, harmonics_cos[0]), uneven(2.0, own + harmonics_cos[1]) + scale * seen.unknown_second_m];
         let limb_sigma_parts_m = [limb_sigma, sin * altitude_sigma, seen.unknown_m, T::zero()];
         let variance = limb_sigma_parts_m.iter().fold(T::zero(), |sum, s| sum + *s * *s);
         let predicted = prior.fixed_from_camera.zip(seen.axis_fixed(body, prior));
@@ -258,6 +259,7 @@ impl<T: Real> Expected<T> {
             harmonics_cos,
             unknown_harmonics_cos,
             tilt_sigma_m: body.tilt_sigma_m(is_placed, sin.atan2(cos)),
+            weather_m,
             level: prior.level,
             sun: prior.sun.filter(|_| body.is_sunlit()).map(|s| *s.v()),
             sun_seen: prior.sun.filter(|_| body.is_seen_in_sunlight()).map(|s| *s.v()),
@@ -280,6 +282,11 @@ impl<T: Real> Expected<T> {
         };
         expected.is_curved = expected.bends();
         Ok(expected)
+    }
+
+    /// Returns the square of the limb's radius over the length of the weather.
+    pub(crate) fn weather_kappa(&self) -> T {
+        band::weather_kappa((self.radius_m + self.limb_m) * self.cos)
     }
 
     /// Returns the 1-sigma of the half-angle from the limb height alone, radians: its sigma over the distance to the

@@ -42,6 +42,7 @@ impl<T: Real> Expected<T> {
             harmonics_cos: [T::ZERO; 2],
             unknown_harmonics_cos: [T::ZERO; 2],
             tilt_sigma_m: T::ZERO,
+            weather_m: T::from_f64(body.weather_km()) * km,
             level: prior.level,
             sun: sun.filter(|_| body.is_sunlit()),
             sun_seen: sun.filter(|_| body.is_seen_in_sunlight()),

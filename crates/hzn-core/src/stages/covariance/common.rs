@@ -9,6 +9,7 @@
 //! | common tilt | g τ, τ from −1 to 1 along the edge |
 //! | common bend | g (3τ² − 1)/2, the second Legendre polynomial |
 //! | unknown azimuth | cos kφ and sin kφ of the azimuth φ about the axis, k = 1, 2 |
+//! | weather | the same, k = 1 to 12 ([`weather`](super::weather)) |
 //! | lens | g·∂u/∂p, the pixel's move for an intrinsic parameter p |
 //!
 //! The limb of an ellipsoid differs from its mean cone by a second harmonic of the azimuth. A limb height that varies
@@ -26,6 +27,7 @@
 
 use super::noise::EdgeNoiseModel;
 use super::sandwich::response;
+use super::weather;
 use crate::base::linalg::{M3, V3, basis};
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LEAST_GRADIENT2, every_weighted};
@@ -87,6 +89,9 @@ pub(super) fn add_terms<T: Real>(
         }
     }
     add(Term::UnknownAzimuth, &uneven);
+    if expected.weather_m > T::ZERO {
+        add(Term::Weather, &weather::covariance(blocks, fit, expected, &response));
+    }
     if let Some(modes) = camera.intrinsic_modes() {
         let mut lens = M3::zeros();
         for mode in modes {
@@ -132,6 +137,15 @@ impl<T: Real> Row<T> {
     /// Returns the weight w of the normal equations.
     pub(super) fn w(&self) -> T {
         self.w
+    }
+    /// Returns cos φ and sin φ of the azimuth φ about the axis.
+    pub(super) fn azimuth(&self) -> [T; 2] {
+        let per = T::one() / (self.x * self.x + self.y * self.y).max(T::from_f64(1e-20)).sqrt();
+        [self.x * per, self.y * per]
+    }
+    /// Returns w h.
+    pub(super) fn h(&self) -> V3<T> {
+        self.h
     }
     /// Returns cos 2φ and sin 2φ of the azimuth φ about the axis.
     pub(super) fn second_harmonic(&self) -> [T; 2] {
@@ -201,7 +215,7 @@ impl<T: Real> Sums<T> {
         let mut along = per_point * T::from_f64(0.5) - T::one();
         let is_uncertain = camera.intrinsic_modes().is_some();
         part(blocks, fit).for_each(|row| {
-            let Row { s, gradient: [gu, gv], h, weight, place, x, y, .. } = row;
+            let Row { s, gradient: [gu, gv], h, weight, place, .. } = row;
             row.add_to(&mut sums.normal);
             let shift = row.shift();
             sums.shift += shift;
@@ -217,8 +231,7 @@ impl<T: Real> Sums<T> {
             sums.numbers[0] += weight;
             sums.numbers[1] += weight * i;
             sums.numbers[2] += weight * i * i;
-            let per = T::one() / (x * x + y * y).max(T::from_f64(1e-20)).sqrt();
-            let (c, s_) = (x * per, y * per);
+            let [c, s_] = row.azimuth();
             sums.harmonics[0][0] += h * c;
             sums.harmonics[0][1] += h * s_;
             sums.harmonics[1][0] += h * (c * c - s_ * s_);

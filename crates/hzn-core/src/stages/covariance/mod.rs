@@ -23,6 +23,7 @@ mod sandwich;
 mod terminator;
 mod third_axis;
 mod uneven;
+mod weather;
 
 use crate::base::linalg::M3;
 use crate::base::real::Real;
