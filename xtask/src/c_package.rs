@@ -75,7 +75,8 @@ fn run_samples(source: &Path, prefix: &Path, out: &Path) -> Outcome {
         steps::run(&mut command)?;
         steps::run(&mut Command::new(&program))
     };
-    build("cc", CFE, &["cfs/hzn_app.c", "cfs/stubs/run.c"], &["cfs/stubs"])?;
+    // It includes the application.
+    build("cc", CFE, &["cfs/stubs/run.c", "cfs/hzn_app_tbl.c"], &["cfs/stubs", "cfs"])?;
     // F´ looks for headers from the root of the project on.
     let fprime = ["fprime/Components/HznSensor/HznSensor.cpp", "fprime/stubs/run.cpp"];
     build("c++", &["-std=c++14"], &fprime, &["fprime", "fprime/stubs"])

@@ -21,37 +21,69 @@ constexpr struct {
 
 }  // namespace
 
-HznSensor::HznSensor(const char* name) : HznSensorComponentBase(name), m_memory{}, m_sensor(nullptr) {}
+HznSensor::HznSensor(const char* name)
+    : HznSensorComponentBase(name), m_memory{}, m_sensor(nullptr), m_pictures(0), m_refused(0) {}
 
 void HznSensor::configure() {
     I32 code = hzn_open(m_memory, sizeof m_memory, HZN_INTERFACE, &m_sensor);
     for (const auto& parameter : PARAMETERS) {
-        if (code == 0) {
+        if (code == HZN_OK) {
             code = hzn_set(m_sensor, parameter.number, parameter.value);
         }
     }
-    if (code == 0) {
+    if (code == HZN_OK) {
         code = hzn_apply(m_sensor);
     }
-    if (code != 0) {
-        this->log_WARNING_HI_ParameterRefused(hzn_refused(m_sensor), code);
+    if (code != HZN_OK) {
+        this->log_WARNING_HI_NotConfigured(hzn_refused(m_sensor), code);
+        // Without its parameters, the sensor would give directions for another camera.
+        m_sensor = nullptr;
     }
 }
 
 void HznSensor::pictureIn_handler(FwIndexType portNum, Fw::Buffer& picture) {
-    const HznPicture pixels = {picture.getData(), picture.getSize(), WIDTH, HEIGHT, WIDTH};
+    const HznPicture pixels = {picture.getData(), static_cast<size_t>(picture.getSize()), WIDTH, HEIGHT, WIDTH};
     HznAnswer answer;
-    const I32 status = hzn_process(m_sensor, &pixels, nullptr, &answer);
+    const I32 status = this->find(pixels, answer);
+    m_pictures++;
     if (status < 0) {
+        m_refused++;
         this->log_WARNING_LO_PictureRefused(status);
+    } else {
+        this->log_WARNING_LO_PictureRefused_ThrottleClear();
+    }
+    this->send(picture.getContext(), status, answer);
+    this->pictureOut_out(portNum, picture);
+}
+
+I32 HznSensor::find(const HznPicture& picture, HznAnswer& answer) {
+    I32 status = hzn_process(m_sensor, &picture, nullptr, &answer);
+    if (status == HZN_NOT_OPEN) {
+        this->log_WARNING_HI_Reopened();
+        this->configure();
+        status = hzn_process(m_sensor, &picture, nullptr, &answer);
+    }
+    return status;
+}
+
+void HznSensor::send(U32 picture, I32 status, const HznAnswer& answer) {
+    // Without an answer these are NaN, so that no older direction is taken for a new one.
+    Vector axis;
+    for (U32 i = 0; i < 3; i++) {
+        axis[i] = answer.axis[i];
+    }
+    Covariance covariance;
+    for (U32 i = 0; i < 6; i++) {
+        covariance[i] = answer.cov_rad2[i];
     }
     this->tlmWrite_Status(status);
-    // Without an answer these are NaN, so that no older direction is taken for a new one.
-    this->tlmWrite_AxisX(answer.axis[0]);
-    this->tlmWrite_AxisY(answer.axis[1]);
-    this->tlmWrite_AxisZ(answer.axis[2]);
+    this->tlmWrite_Axis(axis);
     this->tlmWrite_Inliers(answer.inliers);
-    this->pictureOut_out(portNum, picture);
+    this->tlmWrite_Pictures(m_pictures);
+    this->tlmWrite_Refused(m_refused);
+    if (this->isConnected_answerOut_OutputPort(0)) {
+        this->answerOut_out(0, picture, status, axis, covariance, answer.inliers, answer.p_limb, answer.protection_rad);
+    }
 }
 
 }  // namespace Hzn

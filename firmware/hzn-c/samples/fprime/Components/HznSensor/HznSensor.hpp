@@ -14,10 +14,17 @@ class HznSensor : public HznSensorComponentBase {
     void configure();
 
   private:
+    friend class HznSensorTester;
+
     void pictureIn_handler(FwIndexType portNum, Fw::Buffer& picture) override;
+    // Finds the limb. A sensor whose memory has changed is opened again, and gets the picture once more.
+    I32 find(const HznPicture& picture, HznAnswer& answer);
+    void send(U32 picture, I32 status, const HznAnswer& answer);
 
     alignas(HZN_WORKSPACE_ALIGN) U8 m_memory[HZN_WORKSPACE_SIZE];
     ::HznSensor* m_sensor;
+    U32 m_pictures;
+    U32 m_refused;
 };
 
 }  // namespace Hzn
