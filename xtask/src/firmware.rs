@@ -357,10 +357,15 @@ fn check_no_panics(board: &str, image: &str) -> Outcome {
 /// Features and form of the library for C.
 const C_LIBRARY: [&str; 7] = ["--package", "hzn-c", "--lib", "--crate-type", "staticlib", "--features", "standalone"];
 
+/// Builds the library for C for this machine, with the profile of the images, and returns its path.
+pub(crate) fn build_c_library() -> Result<PathBuf, Trouble> {
+    steps::run(cargo(&["rustc", "--profile", "flight"]).args(C_LIBRARY))?;
+    Ok(target().join("flight/libhzn.a"))
+}
+
 /// Builds the C example and the package for this machine. In QEMU the example must give the same bits.
 fn check_c_interface() -> Outcome {
-    // With the profile of the images.
-    steps::run(cargo(&["rustc", "--profile", "flight"]).args(C_LIBRARY))?;
+    let library = build_c_library()?;
     let c = root().join("firmware/hzn-c");
     let (example, include) = (c.join("example"), format!("-I{}", c.join("include").display()));
     let out = target().join("firmware/c");
@@ -369,7 +374,7 @@ fn check_c_interface() -> Outcome {
     steps::run(
         Command::new("cc")
             .args(flags)
-            .args([example.join("example.c"), example.join("host.c"), target().join("flight/libhzn.a")])
+            .args([example.join("example.c"), example.join("host.c"), library])
             .arg("-o")
             .arg(out.join("host")),
     )?;

@@ -28,6 +28,7 @@ mod dist;
 mod firmware;
 mod first_command;
 mod flight_build;
+mod frameworks;
 mod ground;
 mod machine;
 mod miri;

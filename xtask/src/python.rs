@@ -8,7 +8,7 @@ use crate::machine::{apt_install, output, target};
 use crate::steps::{Trouble, run};
 
 /// The system's own Python.
-const SYSTEM: &str = if cfg!(windows) { "python" } else { "python3" };
+pub(crate) const SYSTEM: &str = if cfg!(windows) { "python" } else { "python3" };
 
 /// Returns the Python of an environment with the packages that `requirements` lists. The environment is made once, and
 /// made again when the list changes.

@@ -13,7 +13,7 @@ use crate::dist::{self, exclude_unpublished};
 use crate::machine::{apt_install, has, root, target};
 use crate::steps::{self, Outcome, Selection, Step, Steps, Tier, cargo};
 use crate::test_build::build_tests;
-use crate::{campaign, firmware, first_command, ground, miri, page, python, viewer, wheel};
+use crate::{campaign, firmware, first_command, frameworks, ground, miri, page, python, viewer, wheel};
 
 const fn every(name: &'static str, run: fn(&mut Steps) -> Outcome) -> Step {
     Step { name, tier: Tier::Every, run }
@@ -69,6 +69,7 @@ const STEPS: &[Step] = &[
     }),
     long("Basilisk and Rerun", |_| wheel::try_other_tools()),
     long("Yamcs and F´", |_| ground::test()),
+    long("samples in cFS and F´", |_| frameworks::test()),
     long("page in the browser", |_| page::test()),
     long("files of a release", |_| dist::try_release()),
     long("first command", |_| first_command::test()),
