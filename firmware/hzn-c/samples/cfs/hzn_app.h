@@ -8,9 +8,9 @@
 #include "cfe_core_api_base_msgids.h"
 #include "hzn_app_tbl.h"
 
-/* Message IDs. The cFE adds the numbers below (its topics) to the bases of the processor. Take numbers that are free in
-   your mission: the applications of the bundle of NASA use none of these. The ground must not be able to send pictures,
-   because they have a pointer: let the command ingest of the mission refuse HZN_APP_PICTURE_MID. */
+/* Message IDs. The cFE adds the numbers below (its topics) to the bases of the processor. No application of the bundle
+   of NASA has these IDs; CF has 0x08C2. Take numbers that are free in your mission. The ground must not be able to send
+   pictures, because they have a pointer: let the command ingest of the mission refuse HZN_APP_PICTURE_MID. */
 #define HZN_APP_CMD_MID CFE_PLATFORM_CMD_TOPICID_TO_MIDV(0xC0)
 #define HZN_APP_PICTURE_MID CFE_PLATFORM_CMD_TOPICID_TO_MIDV(0xC1)
 #define HZN_APP_SEND_HK_MID CFE_PLATFORM_CMD_TOPICID_TO_MIDV(0xC2)
