@@ -15,7 +15,7 @@ mod told_sun;
 
 use hzn_core::body::PriorError;
 use hzn_core::status::Status;
-use hzn_files::Frames;
+use hzn_files::{FrameData, Frames};
 use hzn_run::engine::{BodyOutcome, Finished};
 use hzn_run::explain;
 
@@ -63,6 +63,8 @@ impl MultiPageFiles {
 pub(crate) struct MissingPriors {
     frames: u64,
     no_row: u64,
+    /// Pictures whose row has an altitude or a position.
+    with_altitude: u64,
     no_time: u64,
     no_altitude: u64,
     below_limb: u64,
@@ -75,6 +77,8 @@ impl MissingPriors {
     pub(crate) fn count(&mut self, frame: &Finished) {
         self.frames += 1;
         self.no_row += u64::from(frame.data.is_none());
+        let has_altitude = |data: &FrameData| data.altitude_km.is_some() || data.position_km.is_some();
+        self.with_altitude += u64::from(frame.data.as_ref().is_some_and(has_altitude));
         self.no_time += u64::from(frame.time_s.is_none());
         let unprocessed = |f: &&BodyOutcome| f.status() == Status::NoAltitude;
         let Some(why) = frame.outcomes.iter().find(unprocessed) else { return };
@@ -85,6 +89,14 @@ impl MissingPriors {
                 self.impossible += 1;
                 self.first_impossible.get_or_insert_with(|| format!("{}: {other}", frame.name));
             }
+        }
+    }
+
+    /// Tells that an altitude of the command line was used for no picture.
+    pub(crate) fn tell_unused_altitude(&self, frames: Option<&Frames>) {
+        if let Some(frames) = frames.filter(|_| self.frames > 0 && self.with_altitude == self.frames) {
+            let table = frames.path.display();
+            tell::line(format_args!("note: --altitude-km is not used: {table} has an altitude for every picture"));
         }
     }
 

@@ -12,7 +12,7 @@ use std::sync::atomic::AtomicBool;
 use hzn_core::Config;
 use hzn_core::config::Orient;
 use hzn_files::frames::Unused;
-use hzn_files::{FrameData, Frames, Sensor};
+use hzn_files::{Frames, Sensor};
 use hzn_run::engine::{self, End, Finished, Plan};
 use hzn_run::open::{Opened, Request};
 use hzn_run::sink::{self, Outputs};
@@ -81,7 +81,7 @@ pub(super) fn run(mut args: Args) -> Outcome {
     output.finish(!is_interrupted)?;
     let lost = source.describe_loss().filter(|_| end == End::Complete);
     lost.iter().for_each(tell::warning);
-    watch.tell(&plan);
+    watch.tell(args, &plan);
     let again = watch.look_again(args, &plan).unwrap_or_default();
     if !args.quiet {
         watch.sum_up(args, &plan, source.as_ref(), &again, (&summary, stored.frames));
@@ -105,19 +105,9 @@ fn open(args: &Args, watching: Option<&Arc<AtomicBool>>) -> Result<Opened, Stop>
     if let Some(frames) = opened.frames.as_ref().filter(|_| args.input.iter().all(|p| p.is_dir())) {
         warn_of_missing_pictures(frames);
     }
-    tell_unused_altitude(args, opened.frames.as_ref());
     refuse_inputs(args, opened.source.as_ref())?;
     picture_folders::prepare(args)?;
     Ok(opened)
-}
-
-/// Tells that `--altitude-km` does nothing if the table has an altitude or a position for each of its pictures.
-fn tell_unused_altitude(args: &Args, frames: Option<&Frames>) {
-    let is_known = |row: &FrameData| row.altitude_km.is_some() || row.position_km.is_some();
-    let all = frames.is_some_and(|frames| !frames.rows.is_empty() && frames.rows.iter().all(is_known));
-    if all && args.sensor.altitude_km.is_some() {
-        tell::line("note: --altitude-km is not used: frames.csv has an altitude for every picture");
-    }
 }
 
 /// Returns the sensor.toml that a recording stores. Its pictures are stored as they were processed, that is, already
@@ -252,8 +242,11 @@ impl Watch {
     }
 
     /// Tells what is odd about the pictures.
-    fn tell(&self, plan: &Plan) {
+    fn tell(&self, args: &Args, plan: &Plan) {
         self.missing.tell(plan.frames.as_ref());
+        if args.sensor.altitude_km.is_some() {
+            self.missing.tell_unused_altitude(plan.frames.as_ref());
+        }
         self.times.tell();
         self.rates.tell(mount_of(&plan.config));
         self.one_place.tell();

@@ -55,6 +55,14 @@ fn place(frame: &str) -> Place {
     place
 }
 
+#[test]
+fn a_folder_of_recordings_that_is_no_bag_names_one() {
+    let place = place("camera");
+    fs::remove_file(place.path("bag/metadata.yaml")).unwrap();
+    let ran = place.run(&["run", "bag", "--sensor", "sensor.toml"]).expect(2);
+    ran.says("give one of them, such as bag/bag_0.mcap").says("ros2 bag reindex");
+}
+
 /// A message of ROS in a recording of hzn: seconds, nanoseconds, log time and frame.
 type Stamped = (u32, u32, u64, String);
 
@@ -216,9 +224,12 @@ fn info_knows_a_bag_a_rig_and_the_settings_of_a_filter() {
 fn an_altitude_that_a_table_replaces_is_told() {
     let place = Place::with_pictures(2);
     place.write("in/frames.csv", b"file,altitude_km\n0000.png,400\n0001.png,400\n");
-    let what = "--altitude-km is not used: frames.csv has an altitude for every picture";
+    let what = "--altitude-km is not used: in/frames.csv has an altitude for every picture";
     place.run(&["run", "in", "--altitude-km", "500"]).expect(0).says(what);
     assert!(!place.run(&["run", "in"]).expect(0).err.contains(what));
+    // A picture without a row, or without an altitude in it, takes that of the command line.
+    place.write("in/frames.csv", b"file,altitude_km\n0000.png,400\n");
+    assert!(!place.run(&["run", "in", "--altitude-km", "500"]).expect(0).err.contains(what));
     place.write("in/frames.csv", b"file,altitude_km\n0000.png,400\n0001.png,\n");
     assert!(!place.run(&["run", "in", "--altitude-km", "500"]).expect(0).err.contains(what));
 }

@@ -172,12 +172,25 @@ impl Gathered {
             if raw { "no headerless files" } else { "no pictures (PNG, JPEG, TIFF, PNM, BMP, WebP, FITS, NumPy)" };
         let name = inputs.first().map(|p| p.display().to_string()).unwrap_or_default();
         let what = format!("{name}: {what} in this folder");
+        if let Some(recording) = inputs.first().and_then(|folder| first_recording(folder)) {
+            return unusable(format!(
+                "{what}; there are recordings, so give one of them, such as {}. The folder of a bag of ROS 2 has a \
+                 metadata.yaml, which `ros2 bag reindex` writes",
+                recording.display()
+            ));
+        }
         match self.left_out.keys().next() {
             Some((Kind::File, e)) => unusable(format!("{what}; there are files ending in .{e}: convert them"))
                 .with_remedy(Remedy::Headerless),
             _ => unusable(what),
         }
     }
+}
+
+/// Returns the first recording in a folder.
+fn first_recording(folder: &Path) -> Option<PathBuf> {
+    let paths = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path());
+    paths.filter(|path| ending(path) == "mcap").min_by(|a, b| natural::compare(a, b))
 }
 
 /// Returns whether there is neither a file nor a link with this name.
