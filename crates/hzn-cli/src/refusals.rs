@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use hzn_core::body::Kind;
 use hzn_core::status::Status;
 use hzn_core::verdict::Verdict;
-use hzn_core::{Report, gates};
+use hzn_core::{Config, Report, gates};
 use hzn_run::engine::Finished;
 use hzn_run::explain;
 pub(crate) use hzn_run::provenance::quoted;
@@ -14,34 +15,37 @@ use crate::doubts::Spread;
 /// The reason why a body was not found in a picture: the verdict on the best candidate, or the status if there is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Why {
-    Verdict(Verdict),
+    /// The verdict, and the kind of the body: the same verdict has another meaning for the Sun than for the Earth.
+    Verdict(Verdict, Kind),
     Status(Status),
 }
 
 impl Why {
     /// Returns the reason; `None` for an answer.
-    fn from_report(report: &Report<f64>) -> Option<Self> {
+    fn from_report(report: &Report<f64>, kind: Kind) -> Option<Self> {
         if report.status == Status::Ok {
             return None;
         }
         let best = explain::best_candidate(report);
-        Some(best.map_or(Self::Status(report.status), |c| Self::Verdict(c.verdict)))
+        Some(best.map_or(Self::Status(report.status), |c| Self::Verdict(c.verdict, kind)))
     }
 
     /// Returns whether the body may have another size than expected.
     fn is_size(self) -> bool {
-        matches!(self, Self::Verdict(Verdict::HalfAngle | Verdict::NoConsensus | Verdict::FewInliers))
+        matches!(self, Self::Verdict(Verdict::HalfAngle | Verdict::NoConsensus | Verdict::FewInliers, _))
     }
 
     /// Returns whether a body of another size may be the reason. The picture of such a body also lacks an edge along a
     /// part of the limb that is expected.
     fn may_be_size(self) -> bool {
-        self.is_size() || self == Self::Verdict(Verdict::Unsupported)
+        self.is_size() || matches!(self, Self::Verdict(Verdict::Unsupported, _))
     }
 
     fn text(self, limits: &gates::Config) -> String {
         match self {
-            Self::Verdict(verdict) => format!("{}: {}", verdict.name(), explain::verdict_text(verdict, limits)),
+            Self::Verdict(verdict, kind) => {
+                format!("{}: {}", verdict.name(), explain::verdict_text(verdict, limits, kind))
+            }
             Self::Status(status) => format!("{status}: {}", explain::status_text(status)),
         }
     }
@@ -87,12 +91,14 @@ pub(crate) struct Commonest<'a> {
 }
 
 impl Refusals {
-    pub(crate) fn count(&mut self, frame: &Finished) {
+    pub(crate) fn count(&mut self, frame: &Finished, config: &Config) {
         let first_here = frame.outcomes.iter().all(|f| f.report.is_ok()).then_some(frame.index);
         let is_further = |report: &Report<f64>| report.status == Status::Ok && report.counters.looks > 1;
         self.further += frame.outcomes.iter().filter(|f| f.report.as_ref().is_ok_and(is_further)).count() as u64;
         let mut may_be_size = false;
-        for why in frame.outcomes.iter().filter_map(|f| Why::from_report(f.report.as_ref().ok()?)) {
+        let bodies = config.each_body();
+        let each = frame.outcomes.iter().zip(bodies);
+        for why in each.filter_map(|(f, body)| Why::from_report(f.report.as_ref().ok()?, body.kind)) {
             self.total += 1;
             may_be_size |= why.may_be_size();
             match self.each.iter_mut().find(|known| known.why == why) {
@@ -129,7 +135,7 @@ impl Refusals {
         Some(Commonest {
             text: format!("{} refused, {share} as {}", self.total, why.text(limits)),
             pictures: first,
-            is_edge: matches!(why, Why::Verdict(_)),
+            is_edge: matches!(why, Why::Verdict(..)),
             is_size: why.is_size(),
         })
     }

@@ -1,18 +1,17 @@
 //! Explains in words and numbers what happened to a picture.
 
-use std::borrow::Cow;
-
+use hzn_core::body::{self, Kind};
 use hzn_core::covariance::Term;
 use hzn_core::report::Candidate;
-use hzn_core::section::{Kind, Section};
-use hzn_core::status::{Stage, Status};
+use hzn_core::section::{self, Section};
+use hzn_core::status::Status;
 use hzn_core::verdict::Verdict;
 use hzn_core::{Report, Solution, evidence, gates};
 
 use crate::engine::Trace;
 
-/// Returns the meaning of a verdict, with the limit that was not met.
-pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
+/// Returns the meaning of a verdict on an edge of a body of this kind, with the limit that was not met.
+pub fn verdict_text(verdict: Verdict, s: &gates::Config, kind: Kind) -> String {
     match verdict {
         Verdict::Chosen => "the answer".into(),
         Verdict::Passed => "passed every gate, but another fits better".into(),
@@ -20,6 +19,7 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         Verdict::FewInliers => format!("fewer than {} inliers (gates.min_inliers)", s.min_inliers),
         Verdict::ShortArc => short_arc_text(s.min_arc_px),
         Verdict::Residuals => residuals_text(s.max_rms_px),
+        Verdict::HalfAngle if is_free(kind) => format!("the {} never has a disc of this size", kind.name()),
         Verdict::HalfAngle => format!(
             "half-angle more than {} sigma from the expected one (gates.max_half_angle_sigma)",
             s.max_half_angle_sigma
@@ -61,7 +61,7 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
         }
         Verdict::Faint => "the brightness hardly changes across the edge, as in twilight".into(),
         Verdict::Unlikely => format!("its probability to be the limb is below {} (gates.min_p_limb)", s.min_p_limb),
-        Verdict::Glow => GLOW.into(),
+        Verdict::Glow => glow_text(kind),
         Verdict::Attitude => format!(
             "the axis is more than {} sigma from the given attitude (gates.max_attitude_sigma)",
             s.max_attitude_sigma
@@ -72,8 +72,19 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config) -> String {
     }
 }
 
-const GLOW: &str = "light reaches high above the edge (gates.max_glow): at night it is airglow or aurora, by day an \
-                    overexposed body, haze on the lens, or stray light";
+/// Returns whether the half-angle of a body is free, as that of Sun and Moon is.
+pub(crate) fn is_free(kind: Kind) -> bool {
+    body::Config { kind, ..body::Config::default() }.half_angle_is_free()
+}
+
+fn glow_text(kind: Kind) -> String {
+    let glare = "an overexposed body, haze on the lens, or stray light";
+    let cause = match kind {
+        Kind::Earth | Kind::EarthSphere => format!("at night it is airglow or aurora, by day {glare}"),
+        _ => glare.to_owned(),
+    };
+    format!("light reaches high above the edge (gates.max_glow): {cause}")
+}
 
 fn residuals_text(max_rms_px: f64) -> String {
     format!(
@@ -89,7 +100,7 @@ pub fn section_text(solution: &Solution<f64>, is_axis_shown: bool) -> String {
         Some(section) if section.semi_axes().iter().any(|a| !(*a < 1e3)) => "nearly a parabola".to_owned(),
         Some(section) => {
             let [along, across] = section.semi_axes();
-            let name = if section.kind() == Kind::Ellipse { "an ellipse" } else { "a hyperbola" };
+            let name = if section.kind() == section::Kind::Ellipse { "an ellipse" } else { "a hyperbola" };
             format!("{name} with the semi-axes {along:.4} and {across:.4} focal lengths")
         }
         None => "not in front of the camera".to_owned(),
@@ -211,106 +222,6 @@ pub fn principal_sigmas(s: &Solution<f64>) -> ([f64; 2], f64) {
     ([(half + root).max(0.0).sqrt(), (half - root).max(0.0).sqrt()], angle)
 }
 
-/// Returns advice for a picture without an answer. Advice for the best candidate comes first, then advice for longer
-/// ones, because the longest edge is most likely the limb.
-pub fn tips(r: &Report<f64>) -> Vec<Cow<'static, str>> {
-    let mut candidates: Vec<_> = r.candidates.iter().collect();
-    candidates.sort_by_key(|c| std::cmp::Reverse(c.length_px));
-    let candidates = best_candidate(r).into_iter().chain(candidates);
-    let by_verdict = candidates.flat_map(|c| VERDICT_TIPS.iter().filter(|(of, _)| of.contains(&c.verdict)));
-    let mut tips: Vec<Cow<'static, str>> = status_tip(r).into_iter().collect();
-    for (_, tip) in by_verdict {
-        if !tips.iter().any(|known| known == tip) {
-            tips.push((*tip).into());
-        }
-    }
-    tips
-}
-
-/// Returns advice that follows from the status of a picture.
-fn status_tip(r: &Report<f64>) -> Option<Cow<'static, str>> {
-    if r.status == Status::NoLimb && r.stage == Stage::Threshold {
-        let size = match r.counters.sampled {
-            0 => String::new(),
-            places => format!(" of {places} places"),
-        };
-        return Some(Cow::Owned(format!(
-            "no bright pixel in the sample{size}: nothing is in view, the exposure does not show it, or the body is \
-             smaller than the distance between two places (then set threshold.method = \"fixed\")"
-        )));
-    }
-    Some(Cow::Borrowed(match r.status {
-        Status::TooDark => "the picture is darker than brightness.min_mean allows: lower it, or expose longer",
-        Status::TooBright => "the picture is brighter than brightness.max_mean allows: raise it, or expose shorter",
-        Status::TooFewPoints => {
-            "only short edges were found, for example of stars, noise or hot pixels. Is the body in view? If the body \
-             is very small, lower edge_points.min_points"
-        }
-        Status::Truncated => {
-            "the edges of the picture cost more than the work budget: raise limits.max_work, mask structure in view, \
-             or set a threshold above the clouds (threshold.method = \"fixed\")"
-        }
-        Status::Ambiguous => "two directions fit about equally well: mask structure in view (mask.polygons_px)",
-        Status::NoLimb if r.candidates.is_empty() => {
-            "no edge is long enough. Is the limb in view? If it is, try another threshold (threshold.scale, or \
-             threshold.level if threshold.method is \"fixed\")"
-        }
-        _ => return None,
-    }))
-}
-
-/// Advice for a picture that has a candidate with one of these verdicts.
-const VERDICT_TIPS: &[(&[Verdict], &str)] = &[
-    (
-        &[Verdict::NoConsensus, Verdict::FewInliers],
-        "no candidate has the form of the expected limb: check altitude_km, the focal length and the lens model; a \
-         larger consensus.threshold_px tolerates a poor calibration",
-    ),
-    (
-        &[Verdict::HalfAngle],
-        "a limb was found, but it is larger or smaller than expected: check altitude and focal length, or raise \
-         body.limb_height_sigma_km",
-    ),
-    (
-        &[Verdict::Residuals],
-        "the edge does not follow the limb closely: check the calibration, or raise gates.max_rms_px",
-    ),
-    (
-        &[Verdict::ShortArc, Verdict::Uncertain],
-        "too little of the limb is in view for a good answer: if a less accurate answer is sufficient, lower \
-         gates.min_arc_px or raise gates.max_sigma_deg",
-    ),
-    (
-        &[Verdict::Unsupported],
-        "an edge fits by chance (cloud, structure): mask the parts of the vehicle in view, or try another threshold",
-    ),
-    (
-        &[Verdict::Attitude],
-        "the picture contradicts the given attitude: check the order of the quaternion (qw, qx, qy, qz: camera to \
-         ECEF), its time, and attitude_sigma_deg",
-    ),
-    (
-        &[Verdict::Unlikely],
-        "the edge has few signs of a limb (see evidence): an attitude (qw, qx, qy, qz) or the Sun (sun_x, sun_y, \
-         sun_z) is evidence, too; gates.min_p_limb = 0 takes the risk",
-    ),
-    (
-        &[Verdict::Night],
-        "it is night below the camera: check utc and x_km, y_km, z_km; for a thermal camera set body.sunlit = false; \
-         gates.max_unlit = 1 takes the risk that the edge is airglow",
-    ),
-    (
-        &[Verdict::Glow],
-        "light reaches high above the edge: by day, expose shorter until the body is below full scale, and keep stray \
-         light from the lens; a larger gates.max_glow passes more of it, but at night airglow, too",
-    ),
-    (
-        &[Verdict::Sun],
-        "the limb is on the night side of the given Sun: check the sign and the frame of sun_x, sun_y, sun_z \
-         (from the camera to the Sun, in the axes of the camera); for a thermal camera set body.sunlit = false",
-    ),
-];
-
 /// Returns the evidence that the answer, or else the last edge with evidence, is the limb: the names and texts of
 /// lines.
 pub fn evidence(
@@ -368,6 +279,8 @@ pub fn counted(n: u64, what: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use hzn_core::status::Stage;
+
     use super::*;
 
     fn report(edges: &[(Verdict, u32)]) -> Report<f64> {
@@ -395,8 +308,6 @@ mod tests {
         assert_eq!(best(&[(Verdict::HalfAngle, 900), (Verdict::Attitude, 300), (Verdict::Taken, 2000)]), Some(1));
         assert_eq!(best(&[(Verdict::Residuals, 100), (Verdict::Residuals, 300), (Verdict::Residuals, 300)]), Some(1));
         assert_eq!(best(&[]), None);
-        let tips = tips(&report(&[(Verdict::HalfAngle, 900), (Verdict::Attitude, 300)]));
-        assert!(tips[0].contains("contradicts the given attitude"), "{tips:?}");
     }
 
     #[test]

@@ -8,6 +8,7 @@ use hzn_core::{Config, Report, Solution, body, threshold};
 use hzn_files::FrameData;
 use hzn_mcap::roll_pitch_deg;
 
+use crate::advice::{self, Subject};
 use crate::diagnosis::{self, AnyCone};
 use crate::engine::{AnySensor, ExpectedLimb, Trace};
 use crate::error::{Error, unusable};
@@ -189,13 +190,18 @@ impl Explained<'_> {
         if r.candidates.is_empty() {
             return;
         }
+        let kind = self.body.kind;
         line("", "   #   length   points  inliers   rms px  verdict".into());
         for k in &r.candidates {
             let rms = if k.rms_px.is_finite() { format!("{:.3}", k.rms_px) } else { "-".into() };
             let numbers = format!("{:>4} {:>8} {:>8} {:>8} {rms:>8}", k.number, k.length_px, k.points, k.inliers);
             line(
                 "",
-                format!("{numbers}  {}: {}", k.verdict.name(), explain::verdict_text(k.verdict, &self.config.gates)),
+                format!(
+                    "{numbers}  {}: {}",
+                    k.verdict.name(),
+                    explain::verdict_text(k.verdict, &self.config.gates, kind)
+                ),
             );
         }
         let more = (r.counters.candidates as usize).saturating_sub(r.candidates.len());
@@ -352,7 +358,8 @@ impl Explained<'_> {
         let dark = "the border of a dark hole fits the limb: if the body is darker than the sky, as in an infrared \
                     picture with white cold or before a corona, set invert = true in [input] of sensor.toml";
         let mut tips: Vec<String> = self.is_dark.then(|| dark.to_owned()).into_iter().collect();
-        tips.extend(explain::tips(self.report).into_iter().map(Cow::into_owned));
+        let subject = Subject::new(self.body, Some(self.half_angle));
+        tips.extend(advice::tips(self.report, subject).into_iter().map(Cow::into_owned));
         tips.extend(self.picture.unused_bits());
         if tips.is_empty() {
             tips.push("look at the edges that were found, with --overlay out.png".to_owned());

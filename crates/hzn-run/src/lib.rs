@@ -6,7 +6,8 @@
 //! [`rig`] does the same for several cameras that are one sensor.
 //! [`instruments`] makes tables of the inertial unit and the receiver in a recording.
 //! [`results`] reads the files that a sink wrote; [`checked_row`] has the checksums of their rows. [`overlay`] draws
-//! the result over a picture, and [`explained`] describes what happened to it, in the words of [`explain`].
+//! the result over a picture, and [`explained`] describes what happened to it, in the words of [`explain`], with the
+//! [`advice`] for a picture without an answer.
 //! [`diagnosis`] says what would make a refused limb the expected one. [`disk`] has the errors of files that cannot be
 //! written, and [`unread`] the words for pictures that are not read. [`terminal`] makes text from files safe for a
 //! terminal. [`start`] says what pictures tell about a camera without a calibration, [`bars`] finds black bars in them,
@@ -20,6 +21,7 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr, reason = "a library prints nothing; the caller does")]
 
+pub mod advice;
 pub mod bars;
 #[cfg(feature = "recordings")]
 pub mod checked_row;

@@ -214,7 +214,7 @@ impl Watch {
         self.airglow.count(frame, config);
         self.altitudes.count(frame, config);
         self.refused.count(frame);
-        self.refusals.count(frame);
+        self.refusals.count(frame, config);
         self.multi_page.count(frame);
         if !self.quiet {
             self.masks.count(frame, &self.progress);

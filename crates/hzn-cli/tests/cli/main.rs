@@ -1,5 +1,6 @@
 //! Tests of the command `hzn`, through the binary.
 
+mod advice;
 mod arrays;
 mod bad_input;
 mod bags;

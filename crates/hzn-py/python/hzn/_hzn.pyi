@@ -601,7 +601,8 @@ class Sensor:
         Returns
         -------
         str or None
-            None if there is no such limb, if its half-angle is the expected one, or if the sensor has several bodies.
+            None if there is no such limb, if its half-angle is the expected one, if the sensor has several bodies, or
+            for Sun and Moon, whose size says nothing about altitude or lens.
 
         Raises
         ------

@@ -40,8 +40,9 @@ pub fn find_fit(
     trial().and_then(|edge| facts(&edge, true)).or_else(of_other_size).or_else(|| facts(longest_edge(edges)?, false))
 }
 
-/// Returns what a fit says. `given_altitude_km` is the altitude that the picture was processed with. `is_trial` is true
-/// for a fit without the expected half-angle.
+/// Returns what a fit says; `None` for a body whose half-angle says nothing about its distance, as that of Sun and
+/// Moon. `given_altitude_km` is the altitude that the picture was processed with. `is_trial` is true for a fit without
+/// the expected half-angle.
 pub fn fit_facts(
     edge: &Edge,
     fitted: &Fitted,
@@ -56,7 +57,8 @@ pub fn fit_facts(
     let sin_fitted = sin(free.cos);
     // ∂d/∂cos α = −D cot α, where D is the distance from the centre of the body; ∂H/∂cos α = (R + d) cos α/sin³α with
     // R + d = D sin α₀.
-    let limb = fitted.limb_height_m;
+    // The half-angle of Sun and Moon says nothing about the altitude, and they have no limb height.
+    let limb = Some(fitted.limb_height_m?);
     let by_limb = limb.map(|(_, slope)| slope.abs());
     let by_altitude = by_limb.map(|slope| slope * sin(fitted.expected_cos) / (sin_fitted * sin_fitted));
     let implied = |value: f64, slope: f64| Implied { value, sigma: slope / 1e3 * edge_sigma };

@@ -7,12 +7,17 @@ use super::facts::{FitFacts, Implied, Suspect};
 use super::joint::{Pair, Remedy};
 use super::together::{Contradiction, Fault};
 
+/// Angle below which tenths of a degree are too coarse, degrees.
+const SMALL_DEG: f64 = 10.0;
+
 /// Says which half-angle the limb has, and which altitude or field of view would make it the expected one: `the limb
 /// fits 78.6 +- 0.8 deg, expected 75.1 deg: altitude 146 +- 25 km, or a field of view of 91.0 deg at 240 km`. `width`
 /// and `camera` are those of the picture.
 pub fn what_fits(fit: &FitFacts, camera: &Camera<f64>, width: u16) -> String {
+    // A small disc needs more digits than a limb of 70 degrees.
+    let digits = if fit.expected_deg.min(fit.fitted_deg) < SMALL_DEG { 3 } else { 1 };
     let limb = format!(
-        "the limb fits {:.1} +- {:.1} deg, expected {:.1} deg",
+        "the limb fits {:.digits$} +- {:.digits$} deg, expected {:.digits$} deg",
         fit.fitted_deg, fit.fitted_sigma_deg, fit.expected_deg
     );
     let altitude = fit
@@ -24,7 +29,7 @@ pub fn what_fits(fit: &FitFacts, camera: &Camera<f64>, width: u16) -> String {
     let field_of_view = fit
         .focal_factor
         .and_then(|factor| field_of_view_deg(camera, width, factor.value))
-        .map(|deg| format!("a field of view of {deg:.1} deg{at}"));
+        .map(|deg| format!("a field of view of {deg:.*} deg{at}", if deg < SMALL_DEG { 3 } else { 1 }));
     match (altitude, field_of_view) {
         (Some(altitude), Some(field_of_view)) => format!("{limb}: {altitude}, or {field_of_view}"),
         (Some(one), None) | (None, Some(one)) => format!("{limb}: {one}"),

@@ -1,13 +1,14 @@
 //! The diagnosis: why a picture has no answer, in numbers, and a button for each cure.
 
 use egui::{RichText, Ui};
+use hzn_core::body::Kind;
 use hzn_core::status::Status;
 
 use super::agreement::ENOUGH;
 use super::size_table::OfSize;
 use super::steps::{self, Step, wrapped};
 use super::viewer::Viewer;
-use super::{links, theme};
+use super::{facts, links, theme};
 use crate::model::cause::Reason;
 use crate::model::diagnosis::{self, FitFacts};
 use crate::work::frame_view::BodyResult;
@@ -41,8 +42,8 @@ pub(super) fn show(viewer: &mut Viewer, ui: &mut Ui) {
     let of_size = if differs && has_edge && !is_other_edge { OfSize::new(viewer, answer.fit) } else { None };
     let has_numbers = of_size.is_some() || is_other_edge;
     // General advice follows from the edges, and those of a wrong threshold are not the limb.
-    let tips = answer.report.as_ref().map(hzn_run::explain::tips).unwrap_or_default();
-    let tips: Vec<String> = tips.into_iter().map(Into::into).filter(|_| !wrong_level).collect();
+    let config = viewer.session.as_ref().and_then(|session| session.config());
+    let tips = config.filter(|_| !wrong_level).map(|config| facts::tips(&answer, config)).unwrap_or_default();
     let steps = steps_of(viewer, &answer, of_size.as_ref(), if has_numbers { &[] } else { &tips });
     let fill = ui.visuals().faint_bg_color;
     let border = theme::warning(ui.visuals().dark_mode);
@@ -88,7 +89,8 @@ fn say_cause(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult) {
     // The sensor has not looked at the picture, so the reason is all there is to say.
     if let Err(why) = &answer.report {
         links::tip(viewer, ui, &format!("• {why}"));
-        if answer.row.status == Status::NoAltitude {
+        // Sun and Moon need no altitude, so that another value of the picture is the reason.
+        if answer.row.status == Status::NoAltitude && !matches!(answer.kind, Kind::Sun | Kind::Moon) {
             wrapped(ui, NOT_PROCESSED);
         }
     }

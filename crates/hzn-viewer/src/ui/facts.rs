@@ -2,6 +2,7 @@
 
 use hzn_core::status::{Stage, Status};
 use hzn_core::{Config, Report, Solution, body};
+use hzn_run::advice::{self, Subject};
 
 use crate::work::frame_view::{BodyResult, FrameView, Outcome};
 
@@ -61,7 +62,7 @@ pub(super) fn lines(card: &Card, frame_view: &FrameView, outcome: &Outcome, answ
         "Consensus" if reached(Stage::Consensus) => consensus(report, answer),
         "Fit" => answer.solution().map_or_else(Vec::new, |s| fit(s, answer)),
         "Covariance" => answer.solution().map_or_else(Vec::new, |s| covariance(s, answer)),
-        "Gates" => gates(report),
+        "Gates" => gates(report, answer, config),
         _ => Vec::new(),
     }
 }
@@ -173,12 +174,19 @@ fn covariance(s: &Solution<f64>, answer: &BodyResult) -> Vec<String> {
     out
 }
 
-fn gates(report: &Report<f64>) -> Vec<String> {
+/// Returns advice for a picture without an answer, about this body.
+pub(super) fn tips(answer: &BodyResult, config: &Config) -> Vec<String> {
+    let body = config.each_body().iter().find(|body| body.kind == answer.kind);
+    let (Ok(report), Some(body)) = (&answer.report, body) else { return Vec::new() };
+    advice::tips(report, Subject::new(body, answer.expected_rad)).into_iter().map(Into::into).collect()
+}
+
+fn gates(report: &Report<f64>, answer: &BodyResult, config: &Config) -> Vec<String> {
     match report.status {
         Status::Ok => vec!["passed every gate".into()],
         status => {
             let mut out = vec![format!("{status} at {}", report.stage.name())];
-            out.extend(hzn_run::explain::tips(report).into_iter().map(|tip| format!("• {tip}")));
+            out.extend(tips(answer, config).into_iter().map(|tip| format!("• {tip}")));
             out
         }
     }

@@ -262,7 +262,7 @@ fn candidates(viewer: &mut Viewer, ui: &mut Ui, answer: &BodyResult) {
             for text in [c.length_px.to_string(), c.points.to_string(), c.inliers.to_string(), rms] {
                 row |= ui.label(RichText::new(text).size(12.0));
             }
-            let why = select.map(|s| hzn_run::explain::verdict_text(c.verdict, &s)).unwrap_or_default();
+            let why = select.map(|s| hzn_run::explain::verdict_text(c.verdict, &s, answer.kind)).unwrap_or_default();
             row |= ui.label(RichText::new(c.verdict.name()).size(12.0)).on_hover_text(why);
             if row.hovered() || row.contains_pointer() {
                 viewer.pointed = Some(c.number);
