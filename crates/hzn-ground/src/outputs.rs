@@ -29,7 +29,7 @@ impl Sink {
         if sink::target(path)? != Target::Mcap {
             return Ok(Self::Rows(RowFile::create(path, existing)?));
         }
-        let metadata = [("program".to_owned(), format!("hzn {}", env!("CARGO_PKG_VERSION")))].into();
+        let metadata = [("program".to_owned(), format!("hzn telemetry {}", env!("CARGO_PKG_VERSION")))].into();
         let options = hzn_mcap::Options { metadata, force: existing == Existing::Replace, ..Default::default() };
         let writer = hzn_mcap::Writer::create(path, &options).map_err(Error::unusable)?;
         Ok(Self::Mcap(Box::new(writer)))

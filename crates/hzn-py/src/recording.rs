@@ -183,7 +183,7 @@ pub(crate) fn write_mcap(py: Python<'_>, path: PathBuf, sensor: &Sensor, reports
     let frames: Vec<Vec<FrameRecord>> = reports.iter().map(|r| r.get().each().map(Report::record).collect()).collect();
     errors::detached(py, || {
         let sensor_toml = hzn_files::sensor::to_text(&config).map_err(errors::other)?;
-        let metadata = [("program".to_owned(), format!("hzn {}", env!("CARGO_PKG_VERSION")))].into();
+        let metadata = [("program".to_owned(), format!("hzn in Python {}", env!("CARGO_PKG_VERSION")))].into();
         let camera = Some(config.camera);
         let options = hzn_mcap::Options { sensor_toml, metadata, camera, force: true, ..hzn_mcap::Options::default() };
         let mut writer = hzn_mcap::Writer::create(&path, &options).map_err(errors::other)?;

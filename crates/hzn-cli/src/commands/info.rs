@@ -3,6 +3,7 @@
 mod content;
 mod facts;
 mod other;
+mod recording;
 #[cfg_attr(not(feature = "simulator"), path = "info/no_scene.rs")]
 mod scene;
 mod summary;
@@ -18,6 +19,7 @@ use hzn_run::{checked_row, explain, provenance};
 use serde_json::{Value, json};
 
 use facts::Facts;
+use recording::{Writer, is_of_rig};
 use summary::Summary;
 
 use crate::exit::{Exit, Outcome, Stop, failed, usage};
@@ -82,16 +84,21 @@ type Described = (Facts, Option<String>);
 fn recording(file: &Path) -> Result<Described, Stop> {
     // The pictures are read too, because the result says whether they are complete.
     let mut reader = Reader::open(file, Contents::All).map_err(failed)?;
-    let mut summary = Summary::default();
+    let (mut summary, mut pictures) = (Summary::default(), 0u64);
     for frame in reader.by_ref() {
-        summary.add(&frame.map_err(failed)?.row);
+        let frame = frame.map_err(failed)?;
+        summary.add(&frame.row);
+        pictures += u64::from(frame.image.is_some());
     }
     if summary.frames == 0 && reader.sensor_toml().is_none() && reader.unread_reports() == 0 {
         return foreign(file);
     }
     let metadata: BTreeMap<&str, &str> = reader.metadata().iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
-    let is_flight = metadata.get("program").is_some_and(|program| program.starts_with("hzn fly"));
-    let mut out = Facts::new("recording", if is_flight { "recording of hzn fly" } else { "recording of hzn run" });
+    let (writer, is_rig, has_pictures) = (Writer::of(&reader), is_of_rig(&reader), pictures > 0);
+    let mut out = Facts::new("recording", &writer.describe(is_rig, has_pictures));
+    out.key("writer", writer.name());
+    out.line("for", recording::next_steps(is_rig, has_pictures));
+    out.key("recorded_pictures", pictures);
     summary.describe(&mut out);
     for (key, value) in &metadata {
         out.line(&one_line(key), value.to_string());
@@ -138,6 +145,12 @@ fn foreign(file: &Path) -> Result<Described, Stop> {
         span = Some(span.map_or((t, t), |(a, b)| (a.min(t), b.max(t))));
     }
     let mut out = Facts::new("pictures-in-mcap", "recording without results of hzn");
+    let next = if count > 0 {
+        "hzn init FILE writes a sensor.toml for its camera, and hzn run FILE --sensor reads its pictures"
+    } else {
+        "hzn export FILE --imu imu.csv --gnss gnss.csv, if it has messages of these instruments"
+    };
+    out.line("for", next.to_owned());
     out.fact("pictures", count.to_string(), "pictures", count);
     if let (Some(topic), Some((a, b))) = (reader.topic(), span) {
         out.fact("topic", topic.to_owned(), "topic", topic);

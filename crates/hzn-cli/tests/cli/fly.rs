@@ -287,6 +287,8 @@ fn kept_pictures_have_the_logged_answers() {
     let (code, said) = fly_on(&place, &bytes, &["-s", "in/sensor.toml", "--keep-pictures", "5,refused"]);
     assert!(code == Some(0) && said.contains("14 pictures, 11 answers") && said.contains("6 pictures kept"), "{said}");
     place.run(&["run", "state/pictures/fly-000001.mcap", "--flight", "-o", "again.csv"]).expect(0);
+    let info = place.run(&["info", "state/pictures/fly-000001.mcap"]).expect(0).out;
+    assert!(info.contains("pictures that hzn fly kept, with their answers"), "{info}");
     let (again, logged) = (place.rows("again.csv"), logged(&place));
     let files: Vec<&str> = again.iter().map(|row| cell(row, "file")).collect();
     let kept = [0, 3, 5, 7, 10, 11];

@@ -176,3 +176,20 @@ fn another_file_as_the_sensor_is_named() {
     std::fs::rename(place.path("named.toml.png"), place.path("named.toml")).unwrap();
     place.run(&["run", "in", "--sensor", "named.toml"]).expect(2).says("named.toml: is");
 }
+
+#[test]
+fn each_recording_says_what_wrote_it() {
+    let place = Place::with_pictures(2);
+    let told = |file: &str| {
+        let out = place.run(&["info", file]).expect(0).out;
+        let (first, rest) = out.split_once('\n').unwrap();
+        (first.to_owned(), rest.lines().next().unwrap().to_owned())
+    };
+    place.run(&["run", "in", "-o", "a.mcap"]).expect(0);
+    let (what, next) = told("a.mcap");
+    assert!(what.ends_with(" recording of hzn run") && next.contains("hzn run FILE -o again.mcap"), "{what} {next}");
+    place.run(&["run", "a.mcap", "-o", "again.mcap"]).expect(0);
+    place.run(&["run", "in", "-o", "b.mcap", "--no-images"]).expect(0);
+    let (what, next) = told("b.mcap");
+    assert!(what.ends_with("hzn run, without pictures") && !next.contains("again"), "{what} {next}");
+}

@@ -28,6 +28,8 @@ fn a_simulated_rig_runs_at_once_and_its_answers_fit_the_truth() {
     assert_eq!(run(&place, &["-j", "3"], 0), (joint, heads));
     place.run(&["run", "ring/rig.toml", "-o", "out.csv", "-q"]).expect(0);
     place.run(&["run", "ring/rig.toml", "-o", "out.mcap", "-q"]).expect(0);
+    let info = place.run(&["info", "out.mcap"]).expect(0).out;
+    assert!(info.contains("recording of hzn run with a rig\n") && info.contains("--images DIR"), "{info}");
     let from_table = place.run(&["evaluate", "out.csv", "--truth", "ring", "-o", "r.json"]).expect(0).out;
     let json: serde_json::Value = serde_json::from_str(&place.read("r.json")).unwrap();
     let rms = json["evaluations"][0]["errors"]["rms_deg"].as_f64().unwrap();

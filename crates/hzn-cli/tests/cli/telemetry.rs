@@ -125,6 +125,23 @@ fn rows_have_every_column_of_a_run() {
     }
 }
 
+/// A recording of answers is named as what it is.
+#[test]
+fn a_recording_of_telemetry_is_named() {
+    let (place, answer) = disc(false);
+    let mut stream = Stream::default();
+    stream.add_picture(Cuc::since_start(1_000_000), &exposure(1), &answer);
+    place.write("sent.bin", &stream.bytes);
+    place.run(&["telemetry", "sent.bin", "-o", "sent.mcap"]).expect(0);
+    let told = place.run(&["info", "sent.mcap"]).expect(0).out;
+    assert!(told.lines().next().unwrap().ends_with("answers of a flight computer, decoded by hzn telemetry"), "{told}");
+    assert!(told.contains("hzn export FILE -o rows.csv") && !told.contains("hzn run FILE"), "{told}");
+    let json = place.run(&["info", "sent.mcap", "--json"]).expect(0).out;
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((&json["writer"], &json["recorded_pictures"]), (&"telemetry".into(), &0.into()), "{json}");
+    place.run(&["export", "sent.mcap", "-o", "rows.csv"]).expect(0).says("1 row");
+}
+
 /// The limb of the Earth has a probability and a protection level. If their packet is lost, the row says nothing.
 #[test]
 fn rows_have_the_integrity_of_a_run() {
