@@ -34,6 +34,7 @@ pub(crate) fn of_sequence(source: &dyn Source, request: &Request) -> Vec<PathBuf
 /// picture.
 pub(crate) fn pictures_in(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let is_picture = |path: &PathBuf| matches!(ending(path).as_str(), "png" | "jpg" | "jpeg" | "jpe");
+    let is_picture =
+        |path: &PathBuf| matches!(ending(path).as_str(), "png" | "jpg" | "jpeg" | "jpe" | "fits" | "fit" | "fts");
     entries.map(|entry| entry.path()).filter(is_picture).collect()
 }

@@ -11,7 +11,8 @@
 //! [`diagnosis`] says what would make a refused limb the expected one. [`disk`] has the errors of files that cannot be
 //! written, and [`unread`] the words for pictures that are not read. [`terminal`] makes text from files safe for a
 //! terminal. [`start`] says what pictures tell about a camera without a calibration, [`bars`] finds black bars in them,
-//! and [`nadir`] turns the limb axis into the direction to the centre. [`mask`] draws what hides the stars.
+//! and [`nadir`] turns the limb axis into the direction to the centre. [`mask`] draws what hides the stars, and [`wcs`]
+//! writes centre and scale into the header of a FITS file.
 //!
 //! [`record`] turns an answer into the row of the results; the feature `recordings` adds the files. Without it, a
 //! picture in memory goes through the same code without files, threads and clocks, as a browser has it.
@@ -54,5 +55,6 @@ pub mod start;
 mod tangent;
 pub mod terminal;
 pub mod unread;
+pub mod wcs;
 
 pub use error::{Error, Kind, Remedy};

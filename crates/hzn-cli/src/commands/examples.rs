@@ -15,6 +15,7 @@ hzn run flight/ -o - --format jsonl | head -1      JSON Lines on standard output
 ls flight/*.png | hzn run - -s flight/sensor.toml  the pictures of a list
 hzn run inbox/ --watch -o live.csv                 pictures as they arrive, until Ctrl-C
 hzn run flight/ -o a.csv --mask-pictures masks/    what hides the stars, for a star tracker
+hzn run sun/ -o sun.csv --wcs centred/             FITS files with centre and plate scale
 hzn run rig.toml -o rig.csv                        several cameras that are one sensor",
     ),
     (

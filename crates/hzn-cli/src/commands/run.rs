@@ -1,11 +1,13 @@
 //! `hzn run`: processes a sequence of pictures and writes the results.
 
 mod args;
+mod explain_command;
 mod picture_folders;
 mod rig;
+mod wcs;
 
 use std::cmp::Ordering;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -20,6 +22,7 @@ use hzn_run::source::{self, Source, ending};
 use hzn_run::{disk, explain};
 
 pub(super) use args::{Args, cores};
+use explain_command::explain_command;
 
 use super::resume;
 use crate::doubts::{
@@ -29,7 +32,7 @@ use crate::doubts::{
 use crate::exit::{Exit, Outcome, Stop, usage};
 use crate::files;
 use crate::progress::Progress;
-use crate::refusals::{Refusals, quoted, quoted_path};
+use crate::refusals::Refusals;
 use crate::setup::{self, TableFormat, stop_flag};
 use crate::tell;
 use crate::what_fits::{Again, ReadAgain, WhatFits};
@@ -48,18 +51,12 @@ pub(super) fn run(mut args: Args) -> Outcome {
     let Opened { mut source, sensor, frames, notes, .. } = open(args, watching.as_ref())?;
     let recorded = recorded(&sensor);
     let plan = args.plan(sensor, frames)?;
-    let settings = sink::Settings {
-        config: &plan.config,
-        sensor_toml: &recorded,
-        durable: args.durable,
-        ros: args.ros,
-        heads: &[],
-    };
+    let settings = settings(args, &plan, &recorded);
     let format = TableFormat::or_csv(args.format);
     let (mut output, stored) = Outputs::open(&args.output, format, args.existing(), settings)?;
     let plan = Plan { last: stored.last_answers.clone(), ..plan };
     if !args.quiet {
-        tell_notes(&notes, stored.frames, plan.overlay.is_some() || plan.masks.is_some());
+        tell_notes(&notes, stored.frames, args.writes_pictures());
     }
     let total = source.total();
     let plan = match resume::skip_stored(source.as_mut(), &stored, &plan, &args.output) {
@@ -70,15 +67,20 @@ pub(super) fn run(mut args: Args) -> Outcome {
         }
     };
     let mut watch = Watch::new(Progress::new(total, stored.frames, args.quiet), args.quiet);
+    let mut copies = wcs::Copies::new(args.wcs.as_deref(), &plan.config);
     let stop = watching.clone().unwrap_or_else(stop_flag);
     tell::detail(|| format!("threads: {}", plan.threads));
-    let mut see = |frame: &Finished| watch.see(frame, &plan.config);
+    let mut see = |frame: &Finished| {
+        copies.count(frame);
+        watch.see(frame, &plan.config);
+    };
     let end = engine::run(&plan, source.as_mut(), stored.frames, &stop, &mut output, &mut see);
     let summary = watch.summary(&plan.config);
     let end = end?;
     let done = stored.frames + watch.progress.frames();
     let is_interrupted = end == End::Interrupted && args.has_more(done, total);
     output.finish(!is_interrupted)?;
+    copies.write(source.as_ref(), args)?;
     let lost = source.describe_loss().filter(|_| end == End::Complete);
     lost.iter().for_each(tell::warning);
     watch.tell(args, &plan);
@@ -95,6 +97,10 @@ pub(super) fn run(mut args: Args) -> Outcome {
     Ok(if missed { Exit::SomeUnreadable } else { Exit::Done })
 }
 
+fn settings<'a>(args: &Args, plan: &'a Plan, sensor_toml: &'a str) -> sink::Settings<'a> {
+    sink::Settings { config: &plan.config, sensor_toml, durable: args.durable, ros: args.ros, heads: &[] }
+}
+
 /// Opens the pictures with their sensor, and refuses what cannot be processed or would replace an input.
 fn open(args: &Args, watching: Option<&Arc<AtomicBool>>) -> Result<Opened, Stop> {
     let request = setup::request(&args.input, &args.sensor, &args.source)?;
@@ -106,6 +112,7 @@ fn open(args: &Args, watching: Option<&Arc<AtomicBool>>) -> Result<Opened, Stop>
         warn_of_missing_pictures(frames);
     }
     refuse_inputs(args, opened.source.as_ref())?;
+    wcs::check(args, opened.source.as_ref(), opened.sensor.config.input.orient)?;
     picture_folders::prepare(args)?;
     Ok(opened)
 }
@@ -398,33 +405,6 @@ fn tell_interruption(done: u64, total: Option<u64>, outputs: &[PathBuf]) {
         several => format!("; {} are valid, and --resume continues them", several.join(", ")),
     };
     tell::line(format_args!("interrupted after {done}{of} pictures{next}"));
-}
-
-/// Returns the command that explains a picture of this run, ready to be typed.
-fn explain_command(args: &Args, source: &dyn Source, frame: u64) -> String {
-    let mut words = vec!["hzn".to_owned(), "explain".to_owned()];
-    match (source.path(frame), args.input.first()) {
-        (Some(path), _) => words.push(quoted_path(&path)),
-        (None, input) => {
-            words.extend(input.map(|input| quoted_path(input)));
-            words.extend(["--index".to_owned(), frame.to_string()]);
-        }
-    }
-    let mut option = |name: &str, value: Option<String>| {
-        if let Some(value) = value {
-            words.extend([name.to_owned(), quoted(Path::new(&value))]);
-        }
-    };
-    let path = |path: &PathBuf| path.to_string_lossy().into_owned();
-    option("--sensor", args.sensor.sensor.as_ref().map(path));
-    option("--altitude-km", args.sensor.altitude_km.map(|km| km.to_string()));
-    option("--frames", args.source.frames.as_ref().map(path));
-    option("--raw", args.source.raw.map(|raw| raw.to_string()));
-    option("--topic", args.source.topic.clone());
-    if args.sensor.flight {
-        words.push("--flight".to_owned());
-    }
-    words.join(" ")
 }
 
 fn warn_of_missing_pictures(frames: &Frames) {

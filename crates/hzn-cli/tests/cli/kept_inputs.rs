@@ -34,6 +34,7 @@ const CASES: &[Case] = &[
     ("a.mcap", &["run", "a.mcap", "-o", "./a.mcap"]),
     ("other/0001.png", &["run", "in/0000.png", "other/0001.png", "--overlay", "other", "--force"]),
     ("other/0001.png", &["run", "in/0000.png", "other/0001.png", "--mask-pictures", "other", "--force"]),
+    ("other/b.fits", &["run", "a.fits", "other/b.fits", "-s", "in/sensor.toml", "--wcs", "other", "--force"]),
     ("in/0000.png", &["explain", "in", "--overlay", "in/0000.png", "--force"]),
     ("in/0001.png", &["explain", "in", "--overlay", "in/0001.png"]),
     ("f.csv", &["explain", "in", "--frames", "f.csv", "--overlay", "f-link.png", "--force"]),
@@ -169,6 +170,14 @@ const CASES: &[Case] = &[
 /// input.
 const WITHOUT: &[&str] = &["info", "view", "completions", "demo", "help", "migrate", "man", "key", "schema"];
 
+/// Returns a dark FITS file.
+fn fits() -> Vec<u8> {
+    let cards = ["SIMPLE  = T", "BITPIX  = 8", "NAXIS   = 2", "NAXIS1  = 320", "NAXIS2  = 240", "END"];
+    let mut bytes: Vec<u8> = cards.iter().flat_map(|card| format!("{card:<80}").into_bytes()).collect();
+    bytes.resize(2880 + 320 * 240, b' ');
+    bytes
+}
+
 /// Returns a folder with an input of each kind, and links to them.
 fn place() -> Place {
     let place = Place::with_pictures(2);
@@ -180,6 +189,9 @@ fn place() -> Place {
     let copy = |from: &str, to: &str| assert!(fs::copy(place.path(from), place.path(to)).unwrap() > 0);
     copy("in/0001.png", "other/0001.png");
     copy("a.mcap", "b.recovering.mcap");
+    for name in ["a.fits", "other/b.fits"] {
+        place.write(name, &fits());
+    }
     for name in ["in/frames.csv", "f.csv", "g.csv", "n.innovations.csv", "new.csv.part", "new.csv.part.chain"] {
         place.write(name, b"file,altitude_km\n0000.png,400\n0001.png,400\n");
     }

@@ -31,6 +31,7 @@ const CASES: &[&[&str]] = &[
     &["run", "in", "--frames", "frames.csv", "-o", "b.csv"],
     &["run", "in", "-o", "no{E}/x.csv"],
     &["run", "in", "--overlay", "d{E}"],
+    &["run", "in", "--wcs", "w{E}"],
     &["run", "{E}"],
     &["run", "in", "--raw", "{E}"],
     &["run", "in", "--{E}"],

@@ -16,6 +16,8 @@ use super::picture::{Picture, Samples};
 const HEADER_BYTES: u64 = 1 << 20;
 /// Size of a block of FITS in bytes. The header fills whole blocks.
 const FITS_BLOCK: usize = 2880;
+/// How a FITS file begins.
+pub(crate) const FITS_START: &[u8] = b"SIMPLE  =";
 /// Length of a line of a FITS header in bytes.
 const FITS_CARD: usize = 80;
 
@@ -52,7 +54,7 @@ fn parse_header(head: &[u8]) -> Option<Result<Array, String>> {
     if head.starts_with(b"\x93NUMPY") {
         return Some(numpy(head));
     }
-    head.starts_with(b"SIMPLE  =").then(|| fits(head))
+    head.starts_with(FITS_START).then(|| fits(head))
 }
 
 /// Decodes an array. `None` if the file is of another format.
@@ -153,6 +155,32 @@ fn numpy(head: &[u8]) -> Result<Array, String> {
     let (is_float, is_signed) = (letter == "f", letter == "i");
     let (big_endian, offset) = (order == ">", start + length);
     Ok(Array { width, height, size, is_float, is_signed, big_endian, offset, from_below: false, scale: 1.0, zero: 0.0 })
+}
+
+/// Where the parts of a FITS file are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct FitsHeader {
+    /// Number of rows.
+    pub(crate) height: u32,
+    /// The last row of the picture comes first.
+    pub(crate) from_below: bool,
+    /// Where the card `END` begins.
+    pub(crate) end: usize,
+    /// Where the data begin.
+    pub(crate) data: usize,
+}
+
+/// Returns where the parts of a FITS file are; `None` for another file.
+///
+/// # Errors
+/// The reason why its first part is not a picture.
+pub(crate) fn fits_header(bytes: &[u8]) -> Option<Result<FitsHeader, String>> {
+    let head = bytes.get(..HEADER_BYTES as usize).unwrap_or(bytes);
+    head.starts_with(FITS_START).then(|| {
+        let Array { height, from_below, offset: data, .. } = fits(head)?;
+        let end = head.chunks_exact(FITS_CARD).take_while(|card| !card.starts_with(b"END ")).count() * FITS_CARD;
+        Ok(FitsHeader { height, from_below, end, data })
+    })
 }
 
 /// Reads the header of FITS (standard 4.0, section 4.4).

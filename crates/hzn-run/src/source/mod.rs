@@ -46,6 +46,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 #[cfg(feature = "recordings")]
+pub(crate) use arrays::{FITS_START, FitsHeader, fits_header};
 pub use bag::{conversion, is_bag, recordings as recordings_of_bag};
 pub use bits::{FoundBits, find_bits, with_key};
 #[cfg(feature = "recordings")]

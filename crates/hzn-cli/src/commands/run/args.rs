@@ -15,11 +15,11 @@ use crate::setup::{InputArgs, SensorArgs, TableFormat};
 
 /// Process a sequence of pictures
 ///
-/// Pictures are PNG, JPEG, TIFF, PNM, BMP or WebP, in a folder, as a pattern, or one by one; or headerless (--raw);
-/// or a video (through ffmpeg on PATH); or an MCAP with an image topic. The pictures of a folder or pattern are sorted
-/// by name, and numbers in names are compared by value (img2 before img10). An MCAP of an earlier run is processed
-/// again with its own sensor, names, times and positions. A picture that cannot be read becomes a row with status
-/// `unreadable`; the run goes on.
+/// Pictures are PNG, JPEG, TIFF, PNM, BMP, WebP, FITS or .npy, in a folder, as a pattern, or one by one; or headerless
+/// (--raw); or a video (through ffmpeg on PATH); or an MCAP with an image topic. The pictures of a folder or pattern
+/// are sorted by name, and numbers in names are compared by value (img2 before img10). An MCAP of an earlier run is
+/// processed again with its own sensor, names, times and positions. A picture that cannot be read becomes a row with
+/// status `unreadable`; the run goes on.
 ///
 /// A rig.toml names several cameras that are one sensor: each picture has the row of its camera, and each epoch a row
 /// with the joint answer.
@@ -65,6 +65,10 @@ pub(crate) struct Args {
     /// Move the outlines in the masks farther outwards by this angle
     #[arg(long, value_name = "DEG", default_value = "0", requires = "mask_pictures", value_parser = margin_deg)]
     pub(super) mask_margin_deg: f64,
+    /// Write a copy of every answered FITS file into this folder, with the centre of the body and the plate scale in
+    /// its header (WCS); the rotation is that of the attitude in frames.csv, and else unknown
+    #[arg(long, value_name = "DIR")]
+    pub(super) wcs: Option<PathBuf>,
     /// After the pictures of the folder, wait for those that arrive in it, until Ctrl-C. A PNG or JPEG is complete with
     /// its end, or when it has not changed for ten seconds, and any other picture when it has not changed for half a
     /// second; a file that gets its name when it is complete is always safe
@@ -96,6 +100,7 @@ impl Args {
             overlay: None,
             mask_pictures: None,
             mask_margin_deg: 0.0,
+            wcs: None,
             watch: false,
             jobs: None,
             quiet: true,
@@ -109,6 +114,11 @@ impl Args {
             (_, true) => Existing::Resume,
             _ => Existing::Refuse,
         }
+    }
+
+    /// Returns whether the run writes a picture for each of its own.
+    pub(super) fn writes_pictures(&self) -> bool {
+        self.overlay.is_some() || self.mask_pictures.is_some() || self.wcs.is_some()
     }
 
     /// Returns whether pictures are left. Ctrl-C is the only end of a run that waits for them.

@@ -1,4 +1,4 @@
-//! The folders into which a run writes pictures: overlays and masks.
+//! The folders into which a run writes pictures: overlays, masks, and copies of FITS files.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ use crate::tell;
 
 /// Returns the folders with the options that name them.
 fn given(args: &Args) -> impl Iterator<Item = (&'static str, &Path)> {
-    let folders = [("--overlay", &args.overlay), ("--mask-pictures", &args.mask_pictures)];
+    let folders = [("--overlay", &args.overlay), ("--mask-pictures", &args.mask_pictures), ("--wcs", &args.wcs)];
     folders.into_iter().filter_map(|(option, folder)| Some((option, folder.as_deref()?)))
 }
 

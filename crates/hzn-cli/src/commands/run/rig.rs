@@ -124,6 +124,7 @@ fn check(args: &Args) -> Result<(), Stop> {
         ("--topic", args.source.topic.is_some(), "name the pictures of each head in rig.toml"),
         ("--overlay", args.overlay.is_some(), "draw the pictures of one head: hzn run FOLDER --overlay DIR"),
         ("--mask-pictures", args.mask_pictures.is_some(), "use one head: hzn run FOLDER --mask-pictures DIR"),
+        ("--wcs", args.wcs.is_some(), "use one head: hzn run FOLDER --wcs DIR"),
         ("--watch", args.watch, "watch the folder of one head"),
     ];
     match refused.into_iter().find(|(_, is_given, _)| *is_given) {
