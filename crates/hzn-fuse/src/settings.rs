@@ -49,8 +49,9 @@ impl ErrorSetting {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LensSetting {
-    /// How a solve of the whole flight treats it. With `off` it stays a part of each direction's covariance, as it is
-    /// for the filter.
+    /// How a solve of the whole flight treats it. With an inertial unit `considered` and `estimated` are the same: it
+    /// is an unknown with this prior. In an orbit, `considered` widens the covariance, and is not corrected. With `off` it
+    /// stays a part of each direction's covariance, as it is for the filter.
     pub mode: Treatment,
     /// 1-sigma; 0 or more.
     pub sigma: Option<f64>,
@@ -135,9 +136,9 @@ pub struct Camera {
     pub clock_s: ErrorSetting,
     /// Which measurement the filter takes from a row that has both: the limb's axis, or the position.
     pub limb: Limb,
-    /// Focal length, percent: an unknown of a solve of the whole flight.
+    /// Focal length, percent: an unknown of a solve of the whole flight, or of the orbit.
     pub focal_percent: LensSetting,
-    /// Each coordinate of the principal point, px: an unknown of a solve of the whole flight.
+    /// Each coordinate of the principal point, px: an unknown of a solve of the whole flight, or of the orbit.
     pub centre_px: LensSetting,
 }
 

@@ -118,12 +118,17 @@ pub(super) struct Covariances<'a> {
 }
 
 impl Covariances<'_> {
-    /// Returns the covariance of a block; `None` if the factor does not have it.
-    pub(super) fn of(&self, block: usize) -> Option<DMatrix<f64>> {
+    /// Returns the covariance of the errors of the whole flight, with that of the considered ones themselves; `None` if
+    /// the factor does not have it.
+    pub(super) fn of_shared(&self, block: usize) -> Option<DMatrix<f64>> {
         let mut covariance = self.marginals.block(block, block)?;
-        for (_, moved) in &self.moved {
-            let own = moved.rows(self.pattern.start(block), self.pattern.size(block));
-            covariance += own * own.transpose();
+        for ((which, sigma), moved) in &self.moved {
+            let mut own = moved.rows(self.pattern.start(block), self.pattern.size(block)).into_owned();
+            // They keep their told values but for rounding.
+            for ((other, _), _) in &self.moved {
+                *own.get_mut(*other)? = if other == which { *sigma } else { 0.0 };
+            }
+            covariance += &own * own.transpose();
         }
         Some(covariance)
     }

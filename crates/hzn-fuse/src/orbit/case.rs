@@ -3,18 +3,19 @@
 use std::collections::HashMap;
 
 use hzn_nav::frames::{Cam, Rotation, Vehicle};
-use hzn_nav::options::{CameraOptions, Mode, Options, StartSigmas};
+use hzn_nav::options::{Mode, Options, StartSigmas};
 use nalgebra::{DVector, Vector3};
 
 use super::adjust::{Adjusted, adjust};
-use super::estimates::{Estimates, FASTER, Places};
+use super::estimates::{Estimates, FASTER, OneCamera, Places};
 use super::problem::Problem;
 use super::sights::{self, Attitudes, Sight};
 use super::start;
 use crate::error::Error;
-use crate::input::{Attitude, Inputs};
+use crate::input::{Attitude, Inputs, Recording};
 use crate::results::Counts;
 use crate::settings::Settings;
+use crate::solve::lenses;
 use crate::solve::slow::Link;
 
 /// A flight with what is known about its instruments.
@@ -22,7 +23,7 @@ pub(super) struct Case<'a> {
     pub(super) inputs: &'a Inputs,
     pub(super) settings: &'a Settings,
     pub(super) mounts: &'a [Rotation<Cam, Vehicle>],
-    cameras: Vec<CameraOptions>,
+    cameras: Vec<OneCamera<'a>>,
     pub(super) places: Places,
 }
 
@@ -34,26 +35,36 @@ pub(super) struct Solution {
 }
 
 impl<'a> Case<'a> {
-    pub(super) fn new(inputs: &'a Inputs, settings: &'a Settings, mounts: &'a [Rotation<Cam, Vehicle>]) -> Self {
+    /// # Errors
+    /// The settings have a sigma for a lens that is not known.
+    pub(super) fn new(
+        inputs: &'a Inputs,
+        settings: &'a Settings,
+        mounts: &'a [Rotation<Cam, Vehicle>],
+    ) -> Result<Self, Error> {
         let limb_sigma_km = inputs.recordings.iter().filter_map(|r| r.limb_sigma_km).reduce(f64::max);
         let options: Options = settings.options(limb_sigma_km, StartSigmas::default());
-        let recordings = inputs.recordings.iter().zip(mounts);
-        let cameras: Vec<CameraOptions> =
-            recordings.map(|(r, mount)| settings.camera_options(&r.name, *mount, 1)).collect();
-        let places = Places::new(&options, &cameras, &settings.orbit);
-        Self { inputs, settings, mounts, cameras, places }
+        let recordings = inputs.recordings.iter().zip(mounts).zip(lenses(&inputs.recordings, settings)?);
+        let camera = |((recording, mount), lens): ((&'a Recording, &Rotation<Cam, Vehicle>), _)| {
+            let name = recording.name.as_str();
+            OneCamera { name, options: settings.camera_options(name, *mount, 1), lens }
+        };
+        let cameras: Vec<OneCamera<'a>> = recordings.map(camera).collect();
+        let places = Places::new(&options, &cameras, settings);
+        Ok(Self { inputs, settings, mounts, cameras, places })
     }
 
     /// Returns whether each camera has a slow error.
     fn has_slow(&self) -> Vec<bool> {
-        self.cameras.iter().map(|camera| camera.slow_error != Mode::Off).collect()
+        self.cameras.iter().map(|camera| camera.options.slow_error != Mode::Off).collect()
     }
 
     /// Finds the most probable orbit for attitudes.
     pub(super) fn solve(&self, attitudes: &[Attitude], counts: &mut Counts) -> Result<Solution, Error> {
         let attitudes = Attitudes::new(attitudes, counts);
         let has_slow = self.has_slow();
-        let sights = sights::sights(self.inputs, &attitudes, &has_slow, counts);
+        let lenses: Vec<_> = self.cameras.iter().map(|camera| camera.lens.as_ref()).collect();
+        let sights = sights::sights(self.inputs, &attitudes, (&has_slow, &lenses), counts);
         let (times_s, knots) = start::knots(&sights, &attitudes, self.mounts)?;
         let begin_s = times_s.first().copied().unwrap_or_default();
         let sights: Vec<Sight> = sights.into_iter().filter(|sight| sight.time_s >= begin_s).collect();

@@ -2,10 +2,11 @@
 
 use hzn_nav::frames::{Cam, Rotation, Vehicle};
 use hzn_nav::options::{Block, CameraOptions, Mode, Options};
-use nalgebra::{DVector, Vector3};
+use nalgebra::{DVector, Matrix3xX, Vector3};
 
 use super::dynamics::Motion;
-use crate::settings::Orbit;
+use crate::settings::{self, Settings};
+use crate::solve::Lens;
 
 /// Part of the variance of a slow error that each of its three parts has: one stays the same all flight, one changes
 /// with the time of `orbit.slow_error_time_s`, and one changes [`FASTER`] times as fast.
@@ -32,18 +33,36 @@ pub(super) struct Places {
     pub(super) drag: Option<usize>,
     /// The part of the slow error that stays the same all flight, over its root, of the cameras that have one.
     pub(super) lasting: Vec<Option<usize>>,
+    /// The lens of each camera, if it is unknown.
+    pub(super) lenses: Vec<Option<LensPlace>>,
     /// 1-sigma of each: rad, s, km, 1.
     pub(super) sigmas: Vec<f64>,
     /// Whether each is considered: it keeps its told value, and its sigma is part of the covariance of the others.
     pub(super) considered: Vec<bool>,
 }
 
+/// The unknowns of a lens: independent numbers with a sigma of 1.
+#[derive(Debug, Clone)]
+pub(super) struct LensPlace {
+    pub(super) first: usize,
+    /// What they do to the focal length (a fraction of itself) and to the principal point (px).
+    pub(super) root: Matrix3xX<f64>,
+}
+
+/// A camera with its name and, if that is unknown, its lens.
+pub(super) struct OneCamera<'a> {
+    pub(super) name: &'a str,
+    pub(super) options: CameraOptions,
+    pub(super) lens: Option<Lens>,
+}
+
 impl Places {
-    pub(super) fn new(options: &Options, cameras: &[CameraOptions], orbit: &Orbit) -> Self {
+    pub(super) fn new(options: &Options, cameras: &[OneCamera<'_>], settings: &Settings) -> Self {
+        let orbit = &settings.orbit;
         let mut out = Self::default();
         for camera in cameras {
-            let mount = out.add(&camera.misalignment, 3);
-            let clock = out.add(&camera.clock, 1);
+            let mount = out.add(&camera.options.misalignment, 3);
+            let clock = out.add(&camera.options.clock, 1);
             out.mounts.push(mount);
             out.clocks.push(clock);
         }
@@ -52,10 +71,23 @@ impl Places {
         let drag = if orbit.ballistic_m2_kg > 0.0 { 0.01 * orbit.drag_sigma_percent } else { 0.0 };
         out.drag = out.add(&Block { mode: Mode::Considered, sigma: drag }, 1);
         for camera in cameras {
-            let lasting = out.add(&Block { mode: camera.slow_error, sigma: SHARE.sqrt() }, 3);
+            let lasting = out.add(&Block { mode: camera.options.slow_error, sigma: SHARE.sqrt() }, 3);
             out.lasting.push(lasting);
         }
+        for camera in cameras {
+            let lens = camera.lens.as_ref().map(|lens| out.add_lens(lens, settings.camera(camera.name)));
+            out.lenses.push(lens);
+        }
         out
+    }
+
+    fn add_lens(&mut self, lens: &Lens, settings: &settings::Camera) -> LensPlace {
+        let all = lens.independent(settings);
+        let first = self.sigmas.len();
+        self.sigmas.extend(all.iter().map(|_| 1.0));
+        self.considered.extend(all.iter().map(|one| one.is_considered));
+        let columns: Vec<Vector3<f64>> = all.iter().map(|one| one.by).collect();
+        LensPlace { first, root: Matrix3xX::from_columns(&columns) }
     }
 
     /// Adds an error with this number of components, unless it does not exist or is known exactly.
@@ -164,6 +196,10 @@ impl Estimates {
     pub(super) fn slow(&self, places: &Places, camera: usize, index: usize) -> Vector3<f64> {
         let changing: Vector3<f64> = self.slow.iter().skip(index).take(2).sum();
         self.three(places.lasting.get(camera).copied().flatten()) + changing * SHARE.sqrt()
+    }
+    /// Returns the error of a lens: of the focal length, as a fraction of itself, and of the principal point, px.
+    pub(super) fn lens(&self, place: &LensPlace) -> Vector3<f64> {
+        &place.root * self.shared.rows(place.first, place.root.ncols())
     }
     /// Returns the relative error of the drag.
     pub(super) fn drag(&self, places: &Places) -> f64 {

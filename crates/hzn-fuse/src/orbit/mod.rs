@@ -22,7 +22,7 @@ use crate::error::Error;
 use crate::input::Inputs;
 use crate::results::{Begin, Counts, Epoch, Fused};
 use crate::settings::{Limb, Settings};
-use case::Case;
+use case::{Case, Solution};
 
 /// Finds the orbit. `mounts` are those of the recordings.
 ///
@@ -30,18 +30,18 @@ use case::Case;
 /// There are too few limbs with an attitude, or they do not determine an orbit.
 pub(crate) fn fuse(inputs: &Inputs, settings: &Settings, mounts: &[Rotation<Cam, Vehicle>]) -> Result<Fused, Error> {
     check(inputs, settings)?;
-    let case = Case::new(inputs, settings, mounts);
+    let case = Case::new(inputs, settings, mounts)?;
     let mut counts = Counts::default();
     let solution = case.solve(&inputs.attitudes, &mut counts)?;
     let names: Vec<String> = inputs.recordings.iter().map(|r| r.name.clone()).collect();
     let (epochs, solved) = report::report(&case, &solution, &names)?;
-    let verdict = verdict::verdict(&case, &solution, &names, &epochs);
+    let verdict = verdict::verdict(&case, &solution, &names, (&epochs, &solved));
     let mut notes = vec![
         "the orbit is that of limbs and attitudes alone; the longitude is that of the attitudes, whose frame no limb \
          can test"
             .to_owned(),
     ];
-    notes.extend(told(&case, &names, &epochs));
+    notes.extend(told(&case, &solution, &names, &epochs));
     if !solved.is_converged {
         notes.push(format!("--solve did not converge in {} steps", solved.steps));
     }
@@ -81,21 +81,39 @@ fn check(inputs: &Inputs, settings: &Settings) -> Result<(), Error> {
     }
 }
 
-/// Returns what an error of the told mounts and clocks does to the position along the orbit. No limb and no attitude
-/// tells the three apart.
-fn told(case: &Case<'_>, names: &[String], epochs: &[Epoch]) -> Vec<String> {
+/// Returns what an error of the told mounts, clocks and lenses does to the position along the orbit. A limb that stays
+/// in its place in the picture does not tell them apart.
+fn told(case: &Case<'_>, solution: &Solution, names: &[String], epochs: &[Epoch]) -> Vec<String> {
     let Some(state) = epochs.last().map(|epoch| epoch.state) else { return Vec::new() };
     let speed_m_s = (state.velocity_m_s + earth_rate().cross(&state.position_m)).norm();
     let sigma = |place: Option<usize>| place.and_then(|i| case.places.sigmas.get(i)).copied().unwrap_or(0.0);
-    let of_camera = |((name, mount), clock): ((&String, &Option<usize>), &Option<usize>)| {
-        let (mount_rad, clock_s) = (sigma(*mount), sigma(*clock));
+    let distance_km = state.position_m.norm() * 1e-3;
+    let of_camera = |(camera, name): (usize, &String)| {
+        let of = |all: &[Option<usize>]| sigma(all.get(camera).copied().flatten());
+        let (mount_rad, clock_s) = (of(&case.places.mounts), of(&case.places.clocks));
+        let lens = by_lens_rad(case, solution, camera).map_or_else(String::new, |rad| {
+            format!(", and the {:.3}° of its told lens {:.1} km", rad.to_degrees(), rad * distance_km)
+        });
         format!(
             "along the orbit, a position looks like an error of mount or clock: the told {:.3}° of the mount of \
-             {name} are {:.1} km, and the told {clock_s} s of its clock {:.1} km",
+             {name} are {:.1} km, and the told {clock_s} s of its clock {:.1} km{lens}",
             mount_rad.to_degrees(),
-            mount_rad * state.position_m.norm() * 1e-3,
+            mount_rad * distance_km,
             clock_s * speed_m_s * 1e-3
         )
     };
-    names.iter().zip(&case.places.mounts).zip(&case.places.clocks).map(of_camera).collect()
+    names.iter().enumerate().map(of_camera).collect()
+}
+
+/// Returns the largest sigma of a limb's direction by the told lens of a camera, as the root of the mean square over
+/// its pictures, rad; `None` if the lens is no unknown.
+fn by_lens_rad(case: &Case<'_>, solution: &Solution, camera: usize) -> Option<f64> {
+    let root = &case.places.lenses.get(camera)?.as_ref()?.root;
+    let sights = solution.sights.iter().filter(|sight| sight.camera == camera).filter_map(|sight| sight.by_lens);
+    let variances = sights.map(|by| {
+        let by = by * root;
+        (&by * by.transpose()).symmetric_eigenvalues().max()
+    });
+    let (count, sum) = variances.fold((0.0, 0.0), |(count, sum), variance| (count + 1.0, sum + variance));
+    (count > 0.0).then(|| f64::sqrt(sum / count))
 }

@@ -187,15 +187,7 @@ impl Problem<'_> {
             let by_clock = (later - earlier).into_inner() / (2.0 * DIFFERENCE[1]);
             put(Some(clock), dense(&(sight.across * by_clock)));
         }
-        let mut expected = predicted.into_inner() + sight.by_limb_height.as_inner() * estimates.height_km(self.places);
-        put(self.places.height, dense(&(sight.across * sight.by_limb_height.as_inner())));
-        if let (Some(first), Some(terms)) = (self.places.latitude, LatitudeTerm::both(&place.into())) {
-            for (i, (term, coefficient)) in terms.iter().zip(estimates.latitude_km(self.places)).enumerate() {
-                let by = sight.by_limb_height.into_inner() * term.height + to_camera * term.tilt.as_inner();
-                put(Some(first + i), dense(&(sight.across * by)));
-                expected += by * coefficient;
-            }
-        }
+        let mut expected = predicted.into_inner() + self.shift(estimates, sight, (&to_camera, &place), &mut put);
         if let Some(slow) = self.slow_of(number) {
             put(self.places.lasting.get(sight.camera).copied().flatten(), dense(&(sight.across * sight.root)));
             expected += sight.root * estimates.slow(self.places, sight.camera, slow);
@@ -212,6 +204,36 @@ impl Problem<'_> {
         }
         let error = sight.across * (expected - sight.measured.as_inner());
         error.iter().all(|x| x.is_finite()).then(|| Linear { error: vector(&error), derivatives })
+    }
+}
+
+/// Puts the derivative by an error of the whole flight into its columns, if the error is unknown.
+type Put<'a> = &'a mut dyn FnMut(Option<usize>, DMatrix<f64>);
+
+impl Problem<'_> {
+    /// Returns by how much limb height and lens move the axis of a limb, and puts the derivatives.
+    fn shift(
+        &self,
+        estimates: &Estimates,
+        sight: &Sight,
+        (to_camera, place): (&Matrix3<f64>, &Vector3<f64>),
+        put: Put<'_>,
+    ) -> Vector3<f64> {
+        let mut shift = sight.by_limb_height.as_inner() * estimates.height_km(self.places);
+        put(self.places.height, dense(&(sight.across * sight.by_limb_height.as_inner())));
+        if let (Some(first), Some(terms)) = (self.places.latitude, LatitudeTerm::both(&(*place).into())) {
+            for (i, (term, coefficient)) in terms.iter().zip(estimates.latitude_km(self.places)).enumerate() {
+                let by = sight.by_limb_height.into_inner() * term.height + to_camera * term.tilt.as_inner();
+                put(Some(first + i), dense(&(sight.across * by)));
+                shift += by * coefficient;
+            }
+        }
+        if let Some((lens, by)) = self.places.lenses.get(sight.camera).and_then(Option::as_ref).zip(sight.by_lens) {
+            let across = sight.across * by * &lens.root;
+            put(Some(lens.first), DMatrix::from_column_slice(2, across.ncols(), across.as_slice()));
+            shift += by * estimates.lens(lens);
+        }
+        shift
     }
 }
 

@@ -6,11 +6,12 @@ use hzn_nav::filter::Corrections;
 use hzn_nav::frames::{Covariance, Fixed, Rotation, Vector, Vehicle};
 use hzn_nav::gravity::earth_rate;
 use hzn_nav::strapdown::Nominal;
-use nalgebra::{Matrix3, Matrix6, Vector3};
+use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
 
 use super::adjust::{Covariances, with_covariances};
 use super::case::{Case, Solution};
 use super::dynamics::{GM_M3_S2, Motion, carried_with_derivative, noise};
+use super::estimates::LensPlace;
 use super::problem::position;
 use crate::error::Error;
 use crate::input::Body;
@@ -22,7 +23,7 @@ pub(super) fn report(case: &Case<'_>, solution: &Solution, names: &[String]) -> 
     let at = &solution.adjusted;
     let missing = || Error::failed("--solve: a covariance is missing");
     let (mut epochs, mut solved) = with_covariances(at, &case.places, true, |covariances, factor, pattern| {
-        let shared = covariances.of(at.estimates.shared_block())?;
+        let shared = covariances.of_shared(at.estimates.shared_block())?;
         let considered: BTreeMap<usize, f64> = case.places.considered().collect();
         let estimated = |i: usize| shared.get((i, i)).copied().unwrap_or(0.0).max(0.0).sqrt();
         let sigma = |i: usize| considered.get(&i).copied().unwrap_or_else(|| estimated(i));
@@ -41,7 +42,7 @@ pub(super) fn report(case: &Case<'_>, solution: &Solution, names: &[String]) -> 
             steps: at.steps,
             is_converged: at.is_converged,
             cost: at.cost,
-            determined: determined(case, solution, names, &sigma),
+            determined: determined(case, solution, names, (&sigma, &shared)),
             lowered: lowered(solution),
             limb_share: None,
             sources: BTreeMap::new(),
@@ -196,8 +197,14 @@ fn lowered(solution: &Solution) -> Vec<Lowered> {
     errors.filter_map(one).collect()
 }
 
-/// Returns what was known of the errors of the whole flight before and afterwards.
-fn determined(case: &Case<'_>, solution: &Solution, names: &[String], sigma: &dyn Fn(usize) -> f64) -> Vec<Determined> {
+/// Returns what was known of the errors of the whole flight before and afterwards: `sigma` is that of each, and
+/// `covariance` that of all of them.
+fn determined(
+    case: &Case<'_>,
+    solution: &Solution,
+    names: &[String],
+    (sigma, covariance): (&dyn Fn(usize) -> f64, &DMatrix<f64>),
+) -> Vec<Determined> {
     let (places, estimates) = (&case.places, &solution.adjusted.estimates);
     let mut out = Vec::new();
     let mut add = |name: String, unit: &'static str, factor: f64, first: Option<usize>, len: usize| {
@@ -218,5 +225,27 @@ fn determined(case: &Case<'_>, solution: &Solution, names: &[String], sigma: &dy
         add(format!("mount of {name}"), "deg", 1f64.to_degrees(), *mount, 3);
         add(format!("clock of {name}"), "s", 1.0, *clock, 1);
     }
+    for (name, place) in names.iter().zip(&places.lenses) {
+        out.extend(place.iter().flat_map(|place| lens(name, place, &estimates.lens(place), covariance)));
+    }
     out
+}
+
+/// Returns what was known of a lens before and afterwards.
+fn lens(name: &str, place: &LensPlace, estimate: &Vector3<f64>, covariance: &DMatrix<f64>) -> Vec<Determined> {
+    let n = place.root.ncols();
+    let own = &place.root * covariance.view((place.first, place.first), (n, n)) * place.root.transpose();
+    let before = &place.root * place.root.transpose();
+    let parts = [("focal length", "%", 100.0, 0..1), ("principal point", "px", 1.0, 1..3)];
+    let parts = parts.into_iter().map(|(what, unit, factor, rows)| {
+        let each = |value: &dyn Fn(usize) -> f64| rows.clone().map(|i| factor * value(i)).collect();
+        Determined {
+            name: format!("{what} of {name}"),
+            unit,
+            estimate: each(&|i| estimate[i]),
+            sigma: each(&|i| own[(i, i)].max(0.0).sqrt()),
+            before: each(&|i| before[(i, i)].sqrt()),
+        }
+    });
+    parts.filter(|one| one.before.iter().all(|sigma| *sigma > 0.0)).collect()
 }

@@ -6,6 +6,7 @@ use nalgebra::{Matrix2, Matrix3, SMatrix, Vector3};
 
 use crate::input::{Attitude, Body, Inputs};
 use crate::results::Counts;
+use crate::solve::{Lens, without_lens};
 
 /// Largest turn between two attitudes of the table, rad. Within it the vehicle turns at a constant rate.
 const LARGEST_TURN_RAD: f64 = 0.5;
@@ -93,12 +94,20 @@ pub(super) struct Sight {
     pub(super) told: Option<Vector<Fixed>>,
     /// Symmetric root of the covariance of the slow error, rad.
     pub(super) root: Matrix3<f64>,
+    /// Derivative of the measured axis by the error of the lens, if that is unknown.
+    pub(super) by_lens: Option<Matrix3<f64>>,
     /// Two axes across the direction over the noise.
     pub(super) across: SMatrix<f64, 2, 3>,
 }
 
-/// Returns the limbs of all recordings in the order of time.
-pub(super) fn sights(inputs: &Inputs, attitudes: &Attitudes, has_slow: &[bool], counts: &mut Counts) -> Vec<Sight> {
+/// Returns the limbs of all recordings in the order of time. Of each camera it is told whether it has a slow error, and
+/// its lens if that is unknown.
+pub(super) fn sights(
+    inputs: &Inputs,
+    attitudes: &Attitudes,
+    (has_slow, lenses): (&[bool], &[Option<&Lens>]),
+    counts: &mut Counts,
+) -> Vec<Sight> {
     let mut out: Vec<Sight> = Vec::new();
     for (camera, recording) in inputs.recordings.iter().enumerate() {
         for seen in recording.seen.iter().filter(|seen| seen.body == Body::Limb) {
@@ -107,7 +116,7 @@ pub(super) fn sights(inputs: &Inputs, attitudes: &Attitudes, has_slow: &[bool], 
                 counts.add_unusable(recording.name.clone(), "there is no attitude at the time of the picture", 1);
                 continue;
             };
-            let measurement = DirectionMeasurement {
+            let mut measurement = DirectionMeasurement {
                 camera,
                 body: 0,
                 measured: seen.axis,
@@ -118,6 +127,8 @@ pub(super) fn sights(inputs: &Inputs, attitudes: &Attitudes, has_slow: &[bool], 
                 by_limb_height: seen.by_limb_height,
                 is_limb: true,
             };
+            let lens = lenses.get(camera).copied().flatten();
+            let by_lens = lens.and_then(|lens| without_lens(&mut measurement, lens, seen));
             let usable = measurement.usable();
             let slow = has_slow.get(camera).copied().unwrap_or(false);
             let noise = usable.map(|usable| (usable, whitened(&usable, slow)));
@@ -131,6 +142,7 @@ pub(super) fn sights(inputs: &Inputs, attitudes: &Attitudes, has_slow: &[bool], 
                     altitude_km: seen.altitude_km,
                     told: seen.reference,
                     root: usable.slow_root_rad,
+                    by_lens,
                     across,
                 }),
                 Ok((_, None)) => counts.add_unusable(recording.name.clone(), "the covariance is negative", 1),

@@ -10,7 +10,8 @@ use super::problem::axis;
 use super::told;
 use crate::finding::{Cause, Finding, Level, Source, Verdict};
 use crate::input::Attitude;
-use crate::results::{Counts, Epoch};
+use crate::results::{Counts, Epoch, Solved};
+use crate::verdict::lens;
 
 /// Share of the limbs that count less from which on the inputs contradict each other.
 const LOWERED: f64 = 0.2;
@@ -56,9 +57,15 @@ impl Fit {
 }
 
 /// Returns the verdict over an orbit.
-pub(super) fn verdict(case: &Case<'_>, solution: &Solution, names: &[String], epochs: &[Epoch]) -> Verdict {
+pub(super) fn verdict(
+    case: &Case<'_>,
+    solution: &Solution,
+    names: &[String],
+    (epochs, solved): (&[Epoch], &Solved),
+) -> Verdict {
     let fit = Fit::of(solution);
-    let priors = priors(case, solution, names);
+    let mut priors = priors(case, solution, names);
+    priors.extend(names.iter().filter_map(|name| lens(solved, name)));
     let is_orbit = perigee_km(epochs).is_some_and(|km| km > PERIGEE_KM);
     let mut findings = Vec::new();
     if fit.contradicts() || !priors.is_empty() || !is_orbit || !solution.adjusted.is_converged {

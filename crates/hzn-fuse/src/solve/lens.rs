@@ -8,12 +8,13 @@ use hzn_core::camera::{Camera, Config, Intrinsic};
 use hzn_core::ellipsoid::EARTH_MEAN_RADIUS_M;
 use hzn_core::frames::UnitVec3;
 use hzn_core::pixel::ImagePoint;
-use hzn_nav::filter::basis;
+use hzn_nav::filter::{DirectionMeasurement, basis};
 use nalgebra::{DMatrix, Matrix2, Matrix3, SMatrix, Vector2, Vector3};
 
 use super::places::LensPlaces;
-use crate::input::{Body, Seen};
-use crate::settings;
+use crate::error::Error;
+use crate::input::{Body, Recording, Seen};
+use crate::settings::{self, LensSetting, Settings, Treatment};
 
 /// Number of the unknowns: the focal length as a fraction of itself, and both coordinates of the principal point, px.
 const UNKNOWNS: usize = 3;
@@ -113,6 +114,27 @@ impl Lens {
         });
         let root = own.cholesky().and_then(|factor| factor.l().solve_lower_triangular(&Matrix3::identity()));
         root.unwrap_or_else(|| Matrix3::from_diagonal(&own.diagonal().map(|v| 1.0 / v.sqrt())))
+    }
+
+    /// Returns the errors of the lens as sums of independent numbers with a sigma of 1, which are the columns. Those
+    /// that are considered come first: the others follow from them and from numbers of their own, as far as the
+    /// calibration ties both together.
+    pub(crate) fn independent(&self, settings: &settings::Camera) -> Vec<Independent> {
+        let [focal, centre] =
+            [settings.focal_percent, settings.centre_px].map(|setting| setting.mode == Treatment::Considered);
+        let is_considered = [focal, centre, centre];
+        let mut order: Vec<usize> = (0..UNKNOWNS).filter(|i| self.moved[*i].is_some()).collect();
+        order.sort_by_key(|i| !is_considered[*i]);
+        let own = DMatrix::from_fn(order.len(), order.len(), |i, j| self.prior[(order[i], order[j])]);
+        // Parameters that the calibration ties together exactly count as independent.
+        let alone = || DMatrix::from_diagonal(&own.diagonal().map(f64::sqrt));
+        let root = own.clone().cholesky().map_or_else(alone, |factor| factor.l());
+        let column = |(j, which): (usize, &usize)| {
+            let mut by = Vector3::zeros();
+            order.iter().enumerate().for_each(|(i, row)| by[*row] = root[(i, j)]);
+            Independent { by, is_considered: is_considered[*which] }
+        };
+        order.iter().enumerate().map(column).collect()
     }
 
     /// Returns how the measured cone changes with the error of the lens, true minus told. The cone has an axis in the
@@ -224,6 +246,47 @@ impl Lens {
         rest.eigenvalues.apply(|v| *v = v.max(0.0));
         rest.recompose() + own * (UNSURE * UNSURE)
     }
+}
+
+/// A number with a sigma of 1 that errors of a lens depend on.
+pub(crate) struct Independent {
+    /// What it adds to the focal length (a fraction of itself) and to the principal point (px).
+    pub(crate) by: Vector3<f64>,
+    /// Whether it is considered.
+    pub(crate) is_considered: bool,
+}
+
+/// Takes the part of the lens out of the covariances of a direction, and returns the derivative of its axis by the
+/// error of the lens; `None` if it does not depend on it.
+pub(crate) fn without_lens(measurement: &mut DirectionMeasurement, lens: &Lens, seen: &Seen) -> Option<Matrix3<f64>> {
+    let by = lens.by_lens_of(seen)?;
+    for covariance in [Some(&mut measurement.covariance_rad2), measurement.common_rad2.as_mut()] {
+        covariance.into_iter().for_each(|c| *c = lens.without(c.as_inner(), &by).into());
+    }
+    Some(by)
+}
+
+/// Returns the unknown lenses of recordings, in their order.
+///
+/// # Errors
+/// The settings have a sigma for a lens that is not known.
+pub(crate) fn lenses(recordings: &[Recording], settings: &Settings) -> Result<Vec<Option<Lens>>, Error> {
+    let lens = |recording: &Recording| {
+        let (name, own) = (&recording.name, settings.camera(&recording.name));
+        if let Some(config) = &recording.camera {
+            return Ok(Lens::new(config, own));
+        }
+        let keys = [("focal_percent", own.focal_percent), ("centre_px", own.centre_px)];
+        let is_told = |setting: &LensSetting| setting.sigma_or(0.0) > 0.0 && !recording.is_table;
+        match keys.iter().find(|(_, setting)| is_told(setting)) {
+            Some((key, _)) => Err(Error::unusable(format!(
+                "{name}: {key} has a sigma in fuse.toml, but the lens is not known; give the recording in MCAP, which \
+                 has its sensor.toml, or --mount {name}=sensor.toml, or leave the key out"
+            ))),
+            None => Ok(None),
+        }
+    };
+    recordings.iter().map(lens).collect()
 }
 
 /// Returns the stretches from −1 to 1 in which something is seen.

@@ -25,6 +25,7 @@ mod turning;
 pub(crate) use adjust::solve;
 pub use estimates::{Estimates, Shared};
 pub use lens::{ByLens, Lens};
+pub(crate) use lens::{lenses, without_lens};
 pub use loss::Loss;
 pub use places::{LensPlaces, Places};
 pub use problem::{Problem, Role, Weighed};

@@ -17,7 +17,7 @@ use super::directions::{At, CentreSeen, Direction};
 use super::estimates::{Estimates, column};
 use super::knots::Knot;
 use super::known::{Known, without_fixed};
-use super::lens::Lens;
+use super::lens::{Lens, lenses, without_lens};
 use super::loss::Loss;
 use super::others;
 use super::places::Places;
@@ -26,10 +26,10 @@ use super::turning::Turning;
 use crate::data::Flight;
 use crate::error::Error;
 use crate::events::{Event, Source};
-use crate::input::{Body, Recording, Seen};
+use crate::input::{Body, Seen};
 use crate::reference::limb_axis;
 use crate::results::Kind;
-use crate::settings::{LensSetting, Limb, Settings};
+use crate::settings::{Limb, Settings};
 use crate::sparse::Linear;
 use crate::track::Track;
 
@@ -101,7 +101,7 @@ impl<'a> Problem<'a> {
         let slow: Vec<Option<f64>> =
             cameras.iter().map(|c| (c.slow_error != Mode::Off).then_some(c.slow_error_time_s)).collect();
         let known = without_fixed(&mut options, &mut cameras);
-        let lenses = lenses(flight, settings)?;
+        let lenses = lenses(&flight.inputs.recordings, settings)?;
         let is_unknown: Vec<[bool; 2]> =
             lenses.iter().map(|lens| lens.as_ref().map_or([false; 2], Lens::is_unknown)).collect();
         let places = Places::new(&options, &cameras, &is_unknown);
@@ -204,14 +204,9 @@ impl<'a> Problem<'a> {
             is_limb: seen.body == Body::Limb,
         };
         let lens = self.lenses.get(at.camera).and_then(Option::as_ref);
-        let lens = lens.and_then(|lens| Some((lens, lens.by_lens_of(seen)?)));
-        if let Some((lens, by)) = &lens {
-            for covariance in [Some(&mut measurement.covariance_rad2), measurement.common_rad2.as_mut()] {
-                covariance.into_iter().for_each(|c| *c = lens.without(c.as_inner(), by).into());
-            }
-        }
+        let by_lens = lens.and_then(|lens| without_lens(&mut measurement, lens, seen));
         let mut direction = Direction::new(at, &measurement, &state.position_m, white_rad, slow).ok()?;
-        direction.by_lens = lens.map(|(_, by)| by);
+        direction.by_lens = by_lens;
         self.measured.push((role, Measured::Direction(direction)));
         Some(seen.body)
     }
@@ -314,24 +309,4 @@ fn weighed(role: Role, linear: Linear, loss: Loss, gate_probability: f64) -> Wei
     let limit = chi2_limit(linear.error.len(), gate_probability);
     let (cost, weight) = loss.of(linear.error.norm_squared(), limit);
     Weighed { role, linear, weight, cost }
-}
-
-/// Returns the unknown lenses, in the order of the cameras.
-fn lenses(flight: &Flight<'_>, settings: &Settings) -> Result<Vec<Option<Lens>>, Error> {
-    let lens = |recording: &Recording| {
-        let (name, own) = (&recording.name, settings.camera(&recording.name));
-        if let Some(config) = &recording.camera {
-            return Ok(Lens::new(config, own));
-        }
-        let keys = [("focal_percent", own.focal_percent), ("centre_px", own.centre_px)];
-        let is_told = |setting: &LensSetting| setting.sigma_or(0.0) > 0.0 && !recording.is_table;
-        match keys.iter().find(|(_, setting)| is_told(setting)) {
-            Some((key, _)) => Err(Error::unusable(format!(
-                "{name}: {key} has a sigma in fuse.toml, but the lens is not known; give the recording in MCAP, which \
-                 has its sensor.toml, or --mount {name}=sensor.toml, or leave the key out"
-            ))),
-            None => Ok(None),
-        }
-    };
-    flight.inputs.recordings.iter().map(lens).collect()
 }

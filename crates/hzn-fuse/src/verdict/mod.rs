@@ -36,6 +36,7 @@ use crate::settings::Settings;
 use force::Force;
 use motion::Reckoning;
 use problem::Problem;
+pub(crate) use solution::lens;
 
 /// Most samples that are integrated again for each suspicion: an hour at 50 Hz, in three seconds for all.
 const MOST_SAMPLES: usize = 200_000;

@@ -95,7 +95,7 @@ fn estimates(
 }
 
 /// Compares the estimated lens of a camera with its calibration.
-fn lens(solved: &Solved, name: &str) -> Option<Finding> {
+pub(crate) fn lens(solved: &Solved, name: &str) -> Option<Finding> {
     let own = [format!("focal length of {name}"), format!("principal point of {name}")];
     let estimates = solved.determined.iter().filter(|one| own.contains(&one.name));
     let sigmas = |one: &Determined| {

@@ -29,7 +29,7 @@ const FIRST_SEED: u64 = 91_000;
 const SIGMAS: [f64; 2] = [0.5, 3.0];
 
 /// Returns a lens with an error: the focal lengths as a fraction, the principal point in px.
-fn with_error(told: &Config, error: &Vector3<f64>) -> Config {
+pub(crate) fn with_error(told: &Config, error: &Vector3<f64>) -> Config {
     let mut out = told.clone();
     (out.fx_px, out.fy_px) = (told.fx_px * (1.0 + error.x), told.fy_px * (1.0 + error.x));
     (out.cx_px, out.cy_px) = (told.cx_px + error.y, told.cy_px + error.z);
@@ -87,7 +87,7 @@ fn measured(told: &Config, true_lens: &Config, axis: Vector3<f64>, cos: f64, fre
     (e, c)
 }
 
-fn settings(sigmas: [f64; 2]) -> Settings {
+pub(crate) fn settings(sigmas: [f64; 2]) -> Settings {
     let [focal_percent, centre_px] = sigmas.map(|sigma| LensSetting { mode: Treatment::Estimated, sigma: Some(sigma) });
     Settings { focal_percent, centre_px, ..Settings::default() }
 }

@@ -9,6 +9,7 @@ mod infrared;
 mod lens;
 mod oem;
 mod orbit;
+mod orbit_lens;
 mod points;
 mod recordings;
 mod repeats;

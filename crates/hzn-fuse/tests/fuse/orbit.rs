@@ -17,7 +17,7 @@ const SPIN: f64 = 7.292_115e-5;
 const WHITE: f64 = 3e-4;
 const SLOW: f64 = 3e-4;
 const TRACKER: f64 = 5e-5;
-const MOUNT: f64 = 3.5e-4;
+pub(crate) const MOUNT: f64 = 3.5e-4;
 /// Sigma of the limb height, km.
 const HEIGHT_KM: f64 = 3.0;
 /// Sigma of the told altitudes, km: more than their noise, because they are relative to a sphere.
@@ -28,9 +28,9 @@ const DYNAMICS_S: f64 = 10.0;
 /// Kepler's elements at the start: semi-major axis (m), eccentricity, inclination, node, argument of the perigee and
 /// true anomaly (degrees).
 #[derive(Clone, Copy)]
-struct Elements([f64; 6]);
+pub(crate) struct Elements([f64; 6]);
 
-const ORBITS: [(&str, Elements); 3] = [
+pub(crate) const ORBITS: [(&str, Elements); 3] = [
     ("500 km, near-polar", Elements([6.871e6, 0.001, 97.4, 20.0, 30.0, 0.0])),
     ("700 km, inclined", Elements([7.071e6, 0.001, 51.6, 130.0, 80.0, 200.0])),
     ("400 x 900 km", Elements([7.021e6, 0.0356, 63.4, 250.0, 110.0, 40.0])),
@@ -38,7 +38,7 @@ const ORBITS: [(&str, Elements); 3] = [
 
 /// What a flight has.
 #[derive(Clone, Copy)]
-struct Plan {
+pub(crate) struct Plan {
     elements: Elements,
     seed: u64,
     span_s: f64,
@@ -48,11 +48,13 @@ struct Plan {
     slow_s: f64,
     /// Drag area over mass, m²/kg.
     ballistic_m2_kg: f64,
+    /// How far the vehicle rolls and pitches about its attitude to the horizon, rad.
+    pub(crate) rocking_rad: [f64; 2],
 }
 
 impl Plan {
-    fn new(elements: Elements, seed: u64, span_s: f64) -> Self {
-        Self { elements, seed, span_s, step_s: 60.0, slow_s: 1400.0, ballistic_m2_kg: 0.022 }
+    pub(crate) fn new(elements: Elements, seed: u64, span_s: f64) -> Self {
+        Self { elements, seed, span_s, step_s: 60.0, slow_s: 1400.0, ballistic_m2_kg: 0.022, rocking_rad: [0.0; 2] }
     }
 }
 
@@ -116,7 +118,7 @@ fn step((x, v): Truth, time_s: f64, h: f64, ballistic_m2_kg: f64) -> Truth {
 }
 
 /// The true position and velocity in ECEF at a time.
-struct Place {
+pub(crate) struct Place {
     time_s: f64,
     position_m: Vector3<f64>,
     /// Radial, along and across the orbit, as columns.
@@ -137,8 +139,8 @@ fn axis_of_limb(position_m: &Vector3<f64>) -> Vector3<f64> {
 }
 
 /// Simulates a flight: the inputs as a user has them, with the errors that the covariances tell.
-fn simulate(plan: Plan) -> (Inputs, Vec<Place>) {
-    let Plan { elements, seed, span_s, step_s, slow_s, ballistic_m2_kg } = plan;
+pub(crate) fn simulate(plan: Plan) -> (Inputs, Vec<Place>) {
+    let Plan { elements, seed, span_s, step_s, slow_s, ballistic_m2_kg, rocking_rad: [roll, pitch] } = plan;
     let mut draws = Draws(seed);
     let mut three = |sigma: f64| Vector3::from_fn(|_, _| sigma * draws.normal());
     let mount_error = three(MOUNT);
@@ -156,7 +158,9 @@ fn simulate(plan: Plan) -> (Inputs, Vec<Place>) {
         let radial = x.normalize();
         let across = radial.cross(&v).normalize();
         let axes = to_fixed.into_inner() * Matrix3::from_columns(&[radial, across.cross(&radial), across]);
-        let (attitude, limb_axis) = (looking_down(&axes), axis_of_limb(&position_m));
+        let [roll, pitch] = [roll * (time_s / 97.0).sin(), pitch * (time_s / 61.0).sin()];
+        let rocked = UnitQuaternion::from_euler_angles(roll, pitch, 0.0);
+        let (attitude, limb_axis) = (looking_down(&axes) * rocked, axis_of_limb(&position_m));
         let true_mount = mount * UnitQuaternion::from_scaled_axis(mount_error);
         let to_camera = (attitude * true_mount).inverse();
         let axis = to_camera * limb_axis;
@@ -198,7 +202,7 @@ fn simulate(plan: Plan) -> (Inputs, Vec<Place>) {
     (Inputs { attitudes, recordings: vec![recording], ..Inputs::default() }, places)
 }
 
-fn settings() -> Settings {
+pub(crate) fn settings() -> Settings {
     let mut settings = Settings::default();
     settings.camera.misalignment_deg = ErrorSetting { sigma: MOUNT.to_degrees(), ..settings.camera.misalignment_deg };
     // Camera and star tracker have one clock.
@@ -211,7 +215,7 @@ fn solve(inputs: &Inputs) -> Fused {
 }
 
 /// Adds the squares of the errors of a flight, of their sigmas and of both together, radial, along and across.
-fn add(sums: &mut [Vector3<f64>; 3], fused: &Fused, places: &[Place]) {
+pub(crate) fn add(sums: &mut [Vector3<f64>; 3], fused: &Fused, places: &[Place]) {
     for epoch in &fused.smoothed {
         let place = places.iter().find(|p| p.time_s == epoch.state.time_s).unwrap();
         let error = place.axes.transpose() * (epoch.state.position_m.into_inner() - place.position_m);
@@ -325,7 +329,7 @@ fn what_is_missing_is_named() {
 }
 
 /// Returns the sum of the squared errors of the position over their covariances, 3 is ideal, as a mean over a flight.
-fn nees(fused: &Fused, places: &[Place]) -> f64 {
+pub(crate) fn nees(fused: &Fused, places: &[Place]) -> f64 {
     let of = |epoch: &hzn_fuse::results::Epoch| {
         let place = places.iter().find(|p| p.time_s == epoch.state.time_s).unwrap();
         let error = epoch.state.position_m.into_inner() - place.position_m;
