@@ -1,5 +1,18 @@
 //! Quantiles of χ².
 
+/// Largest mean square of deviations over their variances without an alarm, for a flight of many pictures.
+const MAX_MEAN_SQUARE: f64 = 2.0;
+/// Sigmas of a one-sided probability of 0.27 %: a right flight of few pictures raises an alarm as rarely as another
+/// test with 3 sigmas does.
+const ALARM_SIGMAS: f64 = 2.78;
+
+/// Returns the largest mean square of the pictures' deviations over their variances without an alarm. It scatters more
+/// if the pictures are few. `freedom` is their number without that of the fitted parameters.
+pub(crate) fn max_mean_square(freedom: usize) -> f64 {
+    let freedom = freedom.max(1);
+    MAX_MEAN_SQUARE.max(chi2(freedom, ALARM_SIGMAS) / freedom as f64)
+}
+
 /// Returns a limit of χ² with `freedom` degrees of freedom. χ² is above it as rarely as a Gaussian is above `z` sigmas
 /// (Wilson and Hilferty 1931). From three degrees of freedom on it is right to 1 %.
 pub(crate) fn chi2(freedom: usize, z: f64) -> f64 {

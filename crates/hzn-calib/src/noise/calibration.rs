@@ -21,8 +21,6 @@ const DEFAULT_SIGMA_KM: f64 = 2.0 * MAX_SIGMA_KM;
 /// Floor of the common shift of an edge, in pixels: the default of `covariance.sigma_px`. Blur and threshold move the
 /// middle of an edge by fractions of a pixel, even if the edge is smooth.
 const MIN_SHIFT_PX: f64 = 0.1;
-/// Largest mean square of the residuals over their variances without an alarm.
-pub(super) const MAX_CHI2: f64 = 2.0;
 /// Largest distance of a picture's limb height from the median of all, in sigmas. A picture farther away has another
 /// edge and is excluded.
 const MAX_DEVIATION_SIGMAS: f64 = 6.0;
@@ -150,6 +148,8 @@ pub struct Calibration {
     /// Mean square of the pictures' heights about the fitted heights over their variances, without the scatter. It is
     /// about 1 if edge noise explains the heights.
     pub chi2: f64,
+    /// Largest mean square without an alarm: 2, and more for few pictures, so that 0.3 % of right flights exceed it.
+    pub max_chi2: f64,
     /// The focal length; `None` if the pictures cannot separate it from the limb height.
     pub focal: Option<Focal>,
     /// The pictures, in order.
@@ -198,6 +198,7 @@ impl Calibration {
             height,
             edge,
             chi2: profile.solved.chi2,
+            max_chi2: profile.solved.max_chi2,
             focal: fit_focal(&profile, &consistent),
             pictures: sightings.iter().map(picture).collect(),
             correlation: lag::correlation(consistent.iter().map(|s| &s.lags)),
@@ -228,8 +229,8 @@ impl Calibration {
     /// Returns the alarm if the pictures do not agree with each other or with what was known before, or if the height
     /// is no gain.
     pub fn alarm(&self) -> Option<Refusal> {
-        if self.chi2 > MAX_CHI2 {
-            return Some(Refusal::Alarm { chi2: self.chi2, max_chi2: MAX_CHI2 });
+        if self.chi2 > self.max_chi2 {
+            return Some(Refusal::Alarm { chi2: self.chi2, max_chi2: self.max_chi2 });
         }
         if self.doubt.is_some() {
             return self.doubt;

@@ -6,6 +6,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::quantile;
+
 /// Largest 1-sigma of a limb height from the pictures' own errors, in kilometres: half of the sigma that a sensor
 /// assumes for an unmeasured limb.
 pub(super) const MAX_SIGMA_KM: f64 = 3.5;
@@ -35,6 +37,8 @@ pub(super) struct Solved {
     pub(super) minus_two_ln_likelihood: f64,
     /// Mean square of the residuals over their own variances, without the scatter: χ² per degree of freedom.
     pub(super) chi2: f64,
+    /// Largest one without an alarm, for this number of measurements and parameters.
+    pub(super) max_chi2: f64,
 }
 
 /// Number of values of τ that are tried per decade.
@@ -43,7 +47,7 @@ const STEPS: i32 = 8;
 /// Fits the parameters. The result is `None` if the measurements do not determine them.
 pub(super) fn solve(all: &[Measured]) -> Option<Solved> {
     let parameters = all.first()?.weights.len();
-    let freedom = all.len().checked_sub(parameters).filter(|n| *n > 0)? as f64;
+    let freedom = all.len().checked_sub(parameters).filter(|n| *n > 0)?;
     let mean_variance_km2 = all.iter().map(|m| m.variance_km2).sum::<f64>() / all.len() as f64;
     let tries = (-3 * STEPS..=3 * STEPS).map(|k| mean_variance_km2 * 10f64.powf(2.0 * f64::from(k) / f64::from(STEPS)));
     let scored = |scatter2: f64| solve_with_scatter(all, scatter2).map(|found| (found.restricted, scatter2));
@@ -56,7 +60,8 @@ pub(super) fn solve(all: &[Measured]) -> Option<Solved> {
         covariance: found.covariance,
         scatter2,
         minus_two_ln_likelihood: found.minus_two_ln_likelihood,
-        chi2: without_scatter.square / freedom,
+        chi2: without_scatter.square / freedom as f64,
+        max_chi2: quantile::max_mean_square(freedom),
     })
 }
 
@@ -115,6 +120,7 @@ fn solve_with_scatter(all: &[Measured], scatter2: f64) -> Option<WeightedSolutio
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::draws::Draws;
 
     fn measured(values: &[(f64, f64)]) -> Vec<Measured> {
         values.iter().map(|&(km, sigma)| Measured { km, variance_km2: sigma * sigma, weights: vec![1.0] }).collect()
@@ -138,6 +144,36 @@ mod tests {
         assert!((found.h[0] - 20.0).abs() < 1e-9);
         assert!((found.covariance[(0, 0)].sqrt() - 3.0 / 40f64.sqrt()).abs() < 0.02);
         assert!(found.chi2 > 800.0);
+    }
+
+    /// Right flights raise an alarm in 0.27 % of all cases, whatever the number of their pictures is. With the limit
+    /// of a long flight, 2, more than two of a hundred flights of 12 pictures would.
+    #[test]
+    fn few_right_heights_raise_no_alarm_more_often_than_many() {
+        const FLIGHTS: u32 = 20_000;
+        let mut draws = Draws(77);
+        for (pictures, rows) in [(12, 1), (12, 2), (20, 3), (40, 1)] {
+            let (mut alarms, mut above_two) = (0, 0);
+            for _ in 0..FLIGHTS {
+                let one = |k: usize, draws: &mut Draws| {
+                    let sigma = 0.5 + draws.uniform();
+                    let weights = (0..rows).map(|row| f64::from(u8::from(k % rows == row))).collect();
+                    Measured { km: 20.0 + sigma * draws.normal(), variance_km2: sigma * sigma, weights }
+                };
+                let all: Vec<Measured> = (0..pictures).map(|k| one(k, &mut draws)).collect();
+                let parameters = all[0].weights.len();
+                let square = solve_with_scatter(&all, 0.0).unwrap().square / (pictures - parameters) as f64;
+                alarms += u32::from(square > quantile::max_mean_square(pictures - parameters));
+                above_two += u32::from(square > 2.0);
+            }
+            let [share, before] = [alarms, above_two].map(|n| 100.0 * f64::from(n) / f64::from(FLIGHTS));
+            println!("{pictures} pictures, {rows} rows: {share:.2} % alarms, {before:.2} % above 2");
+            assert!(share < 0.4 && (pictures > 25 || share > 0.15), "{pictures}: {share} %");
+            assert!(pictures > 12 || before > 1.5, "{pictures}: {before} %");
+        }
+        // The solution has the limit of its own number of pictures and parameters.
+        let few = solve(&measured(&[(10.0, 1.0), (12.0, 1.0), (11.0, 1.0)])).unwrap();
+        assert_eq!(few.max_chi2, quantile::max_mean_square(2));
     }
 
     #[test]

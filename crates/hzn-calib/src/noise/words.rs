@@ -2,7 +2,7 @@
 
 use hzn_core::camera::{Config, Covariance, Intrinsic};
 
-use super::calibration::{Calibration, Focal, MAX_CHI2};
+use super::calibration::{Calibration, Focal};
 use crate::words::above;
 
 /// Largest difference of the focal length, and its largest 1-sigma, in percent. The heights are linear in it, with the
@@ -45,8 +45,8 @@ pub fn lines(calibration: &Calibration, pictures: &str, camera: &Config) -> Vec<
             e.length_px
         ),
     ));
-    let [chi2, _] = above(calibration.chi2, MAX_CHI2);
-    lines.push(("chi-square", format!("{chi2} a degree of freedom; 1 is ideal, a value above 2 is an alarm")));
+    let [chi2, limit] = above(calibration.chi2, calibration.max_chi2);
+    lines.push(("chi-square", format!("{chi2} a degree of freedom; 1 is ideal, a value above {limit} is an alarm")));
     if let Some(f) = &calibration.focal {
         lines.push(("focal length", focal(f, camera)));
         lines.push(("", format!("0.1 % of it is {:.2} km of limb height", f.km_per_permille.abs())));

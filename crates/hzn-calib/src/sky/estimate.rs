@@ -16,16 +16,9 @@ use super::view::View;
 use crate::limb_prior::LimbPrior;
 use crate::quantile;
 
-/// Largest mean square of the deviations over their variances without an alarm, for a flight of many pictures.
-const MAX_CHI2: f64 = 2.0;
-/// Sigmas of a one-sided probability of 0.27 %: a right flight of few pictures raises an alarm as rarely as another
-/// test with 3 sigmas does.
-const ALARM_SIGMAS: f64 = 2.78;
-
-/// Returns the largest mean square without an alarm for a number of pictures. It scatters more if they are few.
+/// Returns the largest mean square without an alarm for a number of pictures.
 pub(super) fn max_chi2(pictures: usize) -> f64 {
-    let freedom = pictures.saturating_sub(1).max(1);
-    MAX_CHI2.max(quantile::chi2(freedom, ALARM_SIGMAS) / freedom as f64)
+    quantile::max_mean_square(pictures.saturating_sub(1))
 }
 
 /// One picture in the calibration.
