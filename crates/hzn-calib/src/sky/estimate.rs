@@ -2,7 +2,7 @@
 
 use hzn_core::body;
 use hzn_core::camera::Config;
-use nalgebra::{DMatrix, Matrix2};
+use nalgebra::{DMatrix, DVector, Matrix2};
 
 use super::conflict::Conflict;
 pub use super::fit::MIN_PICTURES;
@@ -82,13 +82,11 @@ pub fn estimate(
 ) -> Result<Estimate, Refusal> {
     let fit = Fit::new(unknowns, body, views, limb)?;
     let observability = Observability::new(&fit, unknowns).ok_or(Refusal::Singular)?;
-    let (first, n) = (fit.layout.first_intrinsic(), fit.layout.intrinsics);
-    let covariance = fit.solution.covariance.view((first, first), (n, n)) + fit.systematic(unknowns);
-    let lens =
-        Parameters::new(unknowns, &fit.changes(), &covariance, fit.rms_px().max(1.0)).ok_or(Refusal::Singular)?;
+    let (changes, covariance) = with_common_errors(&fit, unknowns).ok_or(Refusal::Singular)?;
+    let lens = Parameters::new(unknowns, &changes, &covariance, fit.rms_px().max(1.0)).ok_or(Refusal::Singular)?;
     let height_variance = fit.solution.covariance[(Layout::HEIGHT, Layout::HEIGHT)];
     let shift = fit.layout.first_common();
-    let conflict = conflict(&fit, unknowns, body, &covariance);
+    let conflict = conflict(&fit, unknowns, body, (&changes, &covariance));
     Ok(Estimate {
         camera: lens.camera,
         parameters: lens.list,
@@ -130,14 +128,38 @@ impl Estimate {
     }
 }
 
-/// Compares focal length and limb height with what was known of them. `intrinsics` is the covariance of the lens.
-fn conflict(fit: &Fit, unknowns: &Unknowns, body: &body::Config, intrinsics: &DMatrix<f64>) -> Conflict {
+/// Returns the changes of the lens and their covariance, with the errors S that all edges of this flight have in common.
+///
+/// These errors belong to the flight, and not to what was known before: a good lens must not become worse by a flight,
+/// and must not follow it more than S allows. With the covariance P before and C after a flight without such errors,
+/// M = 1 − C P⁻¹ and K = (1 + M S P⁻¹)⁻¹, the changes are K times those of that flight, and the covariance is
+/// C + K M S Mᵀ. If nothing was known before, it is C + S.
+fn with_common_errors(fit: &Fit, unknowns: &Unknowns) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let (first, n) = (fit.layout.first_intrinsic(), fit.layout.intrinsics);
+    let one = DMatrix::identity(n, n);
+    let flight = fit.solution.covariance.view((first, first), (n, n)).into_owned();
+    let before = unknowns.covariance.clone().cholesky()?;
+    // Both are symmetric: A P⁻¹ = (P⁻¹ A)ᵀ.
+    let gained = &one - before.solve(&flight).transpose();
+    let common = fit.systematic(unknowns);
+    let kept = (&one + &gained * before.solve(&common).transpose()).try_inverse()?;
+    let covariance = flight + &kept * &gained * common * gained.transpose();
+    Some((kept * fit.changes(), (&covariance + covariance.transpose()) * 0.5))
+}
+
+/// Compares focal length and limb height with what was known of them, by the changes of the lens with their covariance.
+fn conflict(
+    fit: &Fit,
+    unknowns: &Unknowns,
+    body: &body::Config,
+    (changes, intrinsics): (&DVector<f64>, &DMatrix<f64>),
+) -> Conflict {
     let scale = unknowns.scale_weights();
     let (first, n) = (fit.layout.first_intrinsic(), fit.layout.intrinsics);
     let covariance = &fit.solution.covariance;
     let focal = 1e4 * (scale.transpose() * intrinsics * &scale)[(0, 0)];
     let both = 100.0 * covariance.view((Layout::HEIGHT, first), (1, n)).transpose().dot(&scale);
-    let shift = [100.0 * scale.dot(&fit.changes()), fit.solution.values[Layout::HEIGHT] - fit.limb.km];
+    let shift = [100.0 * scale.dot(changes), fit.solution.values[Layout::HEIGHT] - fit.limb.km];
     let after = Matrix2::new(focal, both, both, covariance[(Layout::HEIGHT, Layout::HEIGHT)]);
     Conflict::new(body, fit.limb, unknowns.focal_sigma_percent(), shift, after)
 }

@@ -28,6 +28,8 @@ mod observable;
 mod parameters;
 mod passes;
 mod refusal;
+#[cfg(test)]
+mod stars_tests;
 mod system;
 #[cfg(test)]
 mod tests;

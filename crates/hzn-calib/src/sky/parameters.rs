@@ -8,6 +8,11 @@ use super::unknowns::Unknowns;
 
 /// A parameter is determined if its sigma is at most this fraction of that before the flight.
 const DETERMINED: f64 = 0.5;
+/// A lens whose calibration states the covariance of all its parameters is written if a sigma is at most this fraction
+/// of that before. All parameters are then written, because they are one adjustment with what was known before. Above
+/// it, the values before are within half a sigma of that adjustment.
+const GAINED: f64 = 0.9;
+
 /// One intrinsic parameter after the flight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Determined {
@@ -26,7 +31,8 @@ pub struct Determined {
     /// Motion of the corner of the picture for that sigma, in pixels.
     pub corner_px: f64,
     /// Whether the flight determines the parameter: its sigma is at most half of that before, and a principal point is
-    /// known to a pixel, or as well as the edges if they are worse.
+    /// known to a pixel, or as well as the edges if they are worse. If the calibration states the covariance of all
+    /// parameters, the flight determines all of them if it makes one sigma smaller by a tenth.
     pub determined: bool,
 }
 
@@ -60,6 +66,10 @@ impl Parameters {
             halved && sigma(covariance, i) <= limit(i)
         };
         let mut determined: Vec<bool> = (0..changes.len()).map(is_determined).collect();
+        let is_gained = |i: usize| sigma(covariance, i) <= GAINED * sigma(&unknowns.covariance, i);
+        if unknowns.is_calibrated() && (0..changes.len()).any(is_gained) {
+            determined.fill(true);
+        }
         let scale = unknowns.scale_weights();
         let focal_sigma = (scale.transpose() * covariance * &scale)[(0, 0)].sqrt();
         let prior = &unknowns.covariance;

@@ -95,7 +95,8 @@ fn write_undetermined(
     write!(
         f,
         "the flight gives the focal length to ± {focal_percent:.2} %, and before it was known to ± \
-                     {before_percent:.2} %; a value is written if its sigma is at most half of that before. "
+                     {before_percent:.2} %; a value is written if its sigma is at most half of that before, or \
+                     0.9 of it if the calibration states the covariance of all parameters. "
     )?;
     if with_known_limb_percent < 0.5 * focal_percent {
         write!(

@@ -15,7 +15,7 @@ use crate::noise::tests::{Noise, earth, limb, solution};
 
 /// A flight with a known lens.
 #[derive(Clone)]
-struct Flight {
+pub(super) struct Flight {
     /// The real lens.
     lens: Config,
     pictures: usize,
@@ -31,7 +31,7 @@ struct Flight {
 }
 
 impl Flight {
-    fn new(lens: Config, seed: u64) -> Self {
+    pub(super) fn new(lens: Config, seed: u64) -> Self {
         Self {
             lens,
             pictures: 40,
@@ -45,12 +45,12 @@ impl Flight {
         }
     }
 
-    fn body(&self) -> body::Config {
+    pub(super) fn body(&self) -> body::Config {
         body::Config { limb_height_km: 17.0, limb_height_sigma_km: 7.0, altitude_sigma_km: 0.0, ..earth() }
     }
 
     /// Returns the pictures, whose fits start about a degree off.
-    fn views(&self) -> Vec<View> {
+    pub(super) fn views(&self) -> Vec<View> {
         let camera = Camera::try_new(&self.lens).unwrap();
         let mut draws = Draws(self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
         for _ in 0..10 {
@@ -83,7 +83,7 @@ impl Flight {
     }
 }
 
-fn lens(fov_deg: f64) -> Config {
+pub(super) fn lens(fov_deg: f64) -> Config {
     let mut lens = Config::ideal(Model::KannalaBrandt, 960, 720, 960.0 / fov_deg.to_radians());
     lens.k.extend_from_slice(&[-0.05, 0.01]).unwrap();
     lens
@@ -101,7 +101,7 @@ fn told(real: &Config) -> Config {
 }
 
 const KNOWN: LimbPrior = LimbPrior { km: 17.0, sigma_km: 1.0 };
-const DEFAULT: LimbPrior = LimbPrior { km: 17.0, sigma_km: 7.0 };
+pub(super) const DEFAULT: LimbPrior = LimbPrior { km: 17.0, sigma_km: 7.0 };
 
 #[test]
 fn a_wrong_lens_is_corrected_with_a_wrong_limb_height() {

@@ -107,8 +107,9 @@ impl fmt::Display for TrackRefusal {
             Self::Undetermined { focal_percent, before_percent } => write!(
                 f,
                 "the track gives the focal length to ± {focal_percent:.2} %, and before it was known to ± \
-                 {before_percent:.2} %; a value is written if its sigma is at most half of that before. The track must \
-                 cross a large part of the picture"
+                 {before_percent:.2} %; a value is written if its sigma is at most half of that before, or 0.9 of it if \
+                 the calibration states the covariance of all parameters. The track must cross a large part of the \
+                 picture"
             ),
         }
     }
@@ -142,17 +143,17 @@ pub fn estimate_track(unknowns: &Unknowns, sights: &[Sight]) -> Result<Track, Tr
 }
 
 /// A fit that has converged.
-struct Fit {
+pub(super) struct Fit {
     /// Rotation from the nominal to the real camera frame.
     rotation: Rotation3<f64>,
-    changes: DVector<f64>,
+    pub(super) changes: DVector<f64>,
     /// Covariance of the rotation vector (rad), then of the parameters.
-    covariance: DMatrix<f64>,
+    pub(super) covariance: DMatrix<f64>,
     sigma_px: f64,
 }
 
 impl Fit {
-    fn new(unknowns: &Unknowns, sights: &[&Sight]) -> Result<Self, TrackRefusal> {
+    pub(super) fn new(unknowns: &Unknowns, sights: &[&Sight]) -> Result<Self, TrackRefusal> {
         let n = unknowns.list.len();
         let start = start_rotation(&unknowns.before, sights).ok_or(TrackRefusal::NotConverged)?;
         let prior = unknowns.covariance.clone().cholesky().ok_or(TrackRefusal::NotConverged)?.inverse();

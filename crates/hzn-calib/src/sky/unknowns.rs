@@ -80,6 +80,12 @@ impl Unknowns {
         Self { before: config.clone(), list, covariance, stated: known, sides: 1 }
     }
 
+    /// Returns whether the calibration states the covariance of all its parameters, as one of boards or stars does.
+    pub(super) fn is_calibrated(&self) -> bool {
+        let all = self.before.model.intrinsics();
+        self.before.covariance.is_some() && self.list.len() == all.len() && self.stated.iter().all(|stated| *stated)
+    }
+
     /// Returns the calibration with changed parameters.
     pub(super) fn changed_by(&self, changes: &[f64]) -> Config {
         let mut config = self.before.clone();
