@@ -50,8 +50,8 @@ impl ErrorSetting {
 #[serde(deny_unknown_fields)]
 pub struct LensSetting {
     /// How a solve of the whole flight treats it. With an inertial unit `considered` and `estimated` are the same: it
-    /// is an unknown with this prior. In an orbit, `considered` widens the covariance, and is not corrected. With `off` it
-    /// stays a part of each direction's covariance, as it is for the filter.
+    /// is an unknown with this prior. In an orbit, `considered` widens the covariance, and is not corrected. With
+    /// `off` it stays a part of each direction's covariance, as it is for the filter.
     pub mode: Treatment,
     /// 1-sigma; 0 or more.
     pub sigma: Option<f64>,

@@ -128,7 +128,8 @@ impl Estimate {
     }
 }
 
-/// Returns the changes of the lens and their covariance, with the errors S that all edges of this flight have in common.
+/// Returns the changes of the lens and their covariance, with the errors S that all edges of this flight have in
+/// common.
 ///
 /// These errors belong to the flight, and not to what was known before: a good lens must not become worse by a flight,
 /// and must not follow it more than S allows. With the covariance P before and C after a flight without such errors,

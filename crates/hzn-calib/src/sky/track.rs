@@ -107,8 +107,8 @@ impl fmt::Display for TrackRefusal {
             Self::Undetermined { focal_percent, before_percent } => write!(
                 f,
                 "the track gives the focal length to ± {focal_percent:.2} %, and before it was known to ± \
-                 {before_percent:.2} %; a value is written if its sigma is at most half of that before, or 0.9 of it if \
-                 the calibration states the covariance of all parameters. The track must cross a large part of the \
+                 {before_percent:.2} %; a value is written if its sigma is at most half of that before, or 0.9 of it \
+                 if the calibration states the covariance of all parameters. The track must cross a large part of the \
                  picture"
             ),
         }

@@ -132,6 +132,11 @@ fn looking_down(axes: &Matrix3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(down))
 }
 
+/// Returns the turn of a vehicle that rolls and pitches by these angles.
+fn rocked([roll, pitch]: [f64; 2], time_s: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_euler_angles(roll * (time_s / 97.0).sin(), pitch * (time_s / 61.0).sin(), 0.0)
+}
+
 /// Returns the direction of the axis of a limb 40 km high.
 fn axis_of_limb(position_m: &Vector3<f64>) -> Vector3<f64> {
     let cone = LimbCone::try_new((*position_m).into(), WGS84_A_M + 40e3, WGS84_B_M + 40e3).unwrap();
@@ -140,7 +145,7 @@ fn axis_of_limb(position_m: &Vector3<f64>) -> Vector3<f64> {
 
 /// Simulates a flight: the inputs as a user has them, with the errors that the covariances tell.
 pub(crate) fn simulate(plan: Plan) -> (Inputs, Vec<Place>) {
-    let Plan { elements, seed, span_s, step_s, slow_s, ballistic_m2_kg, rocking_rad: [roll, pitch] } = plan;
+    let Plan { elements, seed, span_s, step_s, slow_s, ballistic_m2_kg, rocking_rad } = plan;
     let mut draws = Draws(seed);
     let mut three = |sigma: f64| Vector3::from_fn(|_, _| sigma * draws.normal());
     let mount_error = three(MOUNT);
@@ -158,9 +163,7 @@ pub(crate) fn simulate(plan: Plan) -> (Inputs, Vec<Place>) {
         let radial = x.normalize();
         let across = radial.cross(&v).normalize();
         let axes = to_fixed.into_inner() * Matrix3::from_columns(&[radial, across.cross(&radial), across]);
-        let [roll, pitch] = [roll * (time_s / 97.0).sin(), pitch * (time_s / 61.0).sin()];
-        let rocked = UnitQuaternion::from_euler_angles(roll, pitch, 0.0);
-        let (attitude, limb_axis) = (looking_down(&axes) * rocked, axis_of_limb(&position_m));
+        let (attitude, limb_axis) = (looking_down(&axes) * rocked(rocking_rad, time_s), axis_of_limb(&position_m));
         let true_mount = mount * UnitQuaternion::from_scaled_axis(mount_error);
         let to_camera = (attitude * true_mount).inverse();
         let axis = to_camera * limb_axis;
