@@ -301,12 +301,17 @@ fn only_few_files_use_the_terminal() {
 }
 
 /// Finds the files that print, outside of tests.
+/// Returns whether a file has only tests.
+fn is_of_tests(path: &Path) -> bool {
+    path.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.ends_with("tests.rs"))
+}
+
 fn scan(folder: &Path, crates: &Path, found: &mut Vec<String>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.is_dir() {
             scan(&path, crates, found);
-        } else if path.extension().is_some_and(|ending| ending == "rs") && path.file_name().unwrap() != "tests.rs" {
+        } else if path.extension().is_some_and(|ending| ending == "rs") && !is_of_tests(&path) {
             let text = fs::read_to_string(&path).unwrap();
             let code = text.split("#[cfg(test)]\nmod ").next().unwrap().lines();
             let prints = |line: &str| {
