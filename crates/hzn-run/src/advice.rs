@@ -95,6 +95,10 @@ pub fn of_verdict(verdict: Verdict, subject: Subject) -> Option<Cow<'static, str
         Verdict::NoConsensus | Verdict::FewInliers => return Some(of_form(subject)),
         Verdict::HalfAngle => return Some(of_size(subject)),
         Verdict::Night | Verdict::Sun => of_light(verdict, subject)?,
+        Verdict::Straight => {
+            "too little of the limb is in view, or the lens is too uncertain, to show on which side the body is: a \
+             calibrated lens or a wider one shows more of the curvature"
+        }
         Verdict::Residuals => {
             "the edge does not follow the limb closely: check the calibration, or raise gates.max_rms_px"
         }
@@ -146,6 +150,9 @@ fn size_keys(subject: Subject) -> &'static str {
     }
 }
 
+/// What to write for a camera near the Moon, which the kind `moon` is not for.
+const NEAR_MOON: &str = "For the limb of the Moon from nearby, write kind = \"sphere\" with the size of the Moon";
+
 /// Nothing in the picture has the form of the body.
 fn of_form(subject: Subject) -> Cow<'static, str> {
     const TOLERATE: &str = "a larger consensus.threshold_px tolerates a poor calibration";
@@ -153,9 +160,9 @@ fn of_form(subject: Subject) -> Cow<'static, str> {
         Kind::Sun => format!("no candidate is a disc: is the Sun whole in view, and sharp? {TOLERATE}"),
         Kind::Moon if subject.is_sunlit => format!(
             "no candidate has the form of the Moon's limb: is it in view, and sharp? The border of its night is no \
-             limb, and the Sun's direction (sun_x, sun_y, sun_z) leaves it out; {TOLERATE}"
+             limb, and the Sun's direction (sun_x, sun_y, sun_z) leaves it out; {TOLERATE}. {NEAR_MOON}"
         ),
-        Kind::Moon => format!("no candidate is a disc: is the Moon whole in view, and sharp? {TOLERATE}"),
+        Kind::Moon => format!("no candidate is a disc: is the Moon whole in view, and sharp? {TOLERATE}. {NEAR_MOON}"),
         _ => {
             let keys = size_keys(subject);
             format!(
@@ -173,9 +180,11 @@ fn of_size(subject: Subject) -> Cow<'static, str> {
         Kind::Sun => "a disc was found, but the Sun never looks so small or so large: check the focal length. Is the \
                       disc a lamp, a reflection, or the Moon? Glare makes the Sun larger: expose shorter"
             .into(),
-        Kind::Moon => "a disc was found, but the Moon never looks so small or so large: check the focal length. Is \
-                       the disc a lamp, a reflection, or the Sun? Glare makes the Moon larger: expose shorter"
-            .into(),
+        Kind::Moon => format!(
+            "a disc was found, but the Moon never looks so small or so large: check the focal length. Is the disc a \
+             lamp, a reflection, or the Sun? Glare makes the Moon larger: expose shorter. {NEAR_MOON}"
+        )
+        .into(),
         _ => {
             let keys = if subject.is_earth() { "altitude" } else { size_keys(subject) };
             // From afar, the height of the limb hardly changes the size of the disc.

@@ -160,9 +160,20 @@ pub(super) fn run(args: &Args) -> Outcome {
         start.focal_sigma_percent,
         start.k1_sigma,
     ));
+    tell_radians(args);
     tell_circle(&start);
     tell_width(args, &known, start.lens);
     finish(args, &start.text, &known)
+}
+
+/// Asks for the unit of a narrow field of view that would be that of a usual camera in radians.
+fn tell_radians(args: &Args) {
+    if let Some(fov) = args.fov.filter(|fov| (20.0..180.0).contains(&fov.to_degrees())) {
+        tell::warning(format_args!(
+            "--fov {fov} is in degrees; if it is in radians, write --fov {:.1}",
+            fov.to_degrees()
+        ));
+    }
 }
 
 /// Says that the width is that of the stored picture, if the camera was turned.
@@ -242,7 +253,8 @@ fn calibrated(args: &Args, known: &CameraFacts) -> Result<Option<String>, Stop> 
         Ok(camera) => {
             let ([width, height], (w, h)) = (known.size_px, (camera.width, camera.height));
             tell::warning(format_args!(
-                "{topic} is for {w} x {h} px and the pictures are {width} x {height}: not used"
+                "{topic} is for {w} x {h} px and the pictures are {width} x {height}: not used. Binning and a region of \
+                 interest of such a message are not applied; hzn camera convert applies those of a YAML file"
             ));
             return Ok(None);
         }

@@ -23,7 +23,7 @@ fn a_sweep_as_text_table_and_plot() {
     ];
     let ran = place.run(&sweep).expect(0);
     assert_eq!(ran.out.lines().count(), 6);
-    assert!(ran.err.contains("smallest pitch, fused:"), "{}", ran.err);
+    assert!(ran.err.contains("smallest sigma max:"), "{}", ran.err);
     let table = rows(&place.read("s.csv"));
     let number = |row: usize, name: &str| cell(&table[row], name).parse::<f64>().unwrap();
     // The reference values of Braun & Barf 33 at 98 degrees, 3 sigma, are 0.5400 in pitch and 0.1248 in roll; 0.0998

@@ -289,6 +289,9 @@ fn the_limb_gives_the_field_of_view() {
     std::fs::remove_file(place.path("flight/frames.csv")).unwrap();
     place.run(&["init", "flight", "-o", "t.toml"]).expect(2).says("--fov").says("--altitude");
     place.run(&["init", "flight", "--altitude", "500", "-o", "t.toml"]).expect(0).says("degrees wide");
+    // A field of view in radians is that of a telescope in degrees.
+    let radians = ["init", "flight", "--fov", "1.6", "--lens", "fisheye", "-o", "radians.toml"];
+    place.run(&radians).expect(0).says("if it is in radians, write --fov 91.7");
     // A wrong altitude is told with the one that fits.
     let args = ["init", "flight", "--fov", "92", "--lens", "fisheye", "--altitude", "700", "-o", "wrong.toml"];
     let told = place.run(&args).expect(0).err;

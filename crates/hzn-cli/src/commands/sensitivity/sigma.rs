@@ -63,9 +63,9 @@ pub(super) fn compute(args: &Args) -> Result<Study, Stop> {
         let with = |(p, s): &(Vec<f64>, Option<Sigmas>)| Some((p.clone(), value(s.as_ref()?)?));
         results.iter().filter_map(with).min_by(|a, b| a.1.total_cmp(&b.1))
     };
-    if let Some((place, deg)) = best(|s| Some(s.fused.pitch_deg)).filter(|_| !swept.is_empty()) {
+    if let Some((place, deg)) = best(|s| Some(s.largest_deg)).filter(|_| !swept.is_empty()) {
         let place: Vec<String> = swept.iter().map(|&i| format!("{} {}", grid.axes[i].label, place[i])).collect();
-        notes.push(format!("smallest pitch, fused: {deg:.4} deg at {}", place.join(", ")));
+        notes.push(format!("smallest sigma max: {deg:.4} deg at {}", place.join(", ")));
     }
     let chart = swept.first().map(|&x| chart(&grid, &results, x, &swept[1..]));
     Ok(Study { table, chart, notes })
