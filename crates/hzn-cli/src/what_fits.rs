@@ -221,6 +221,9 @@ impl ReadAgain {
         let camera = Camera::try_new(&config.camera).ok()?;
         let mut found = self.any_fits(request, config)?;
         found.retain(|fit| diagnosis::is_misfit(fit, config));
+        if let Some(text) = contradicting(&found, self.each.len()) {
+            return Some(WhatFits { text, pictures: found.len() });
+        }
         let fits = diagnosis::what_fits(&diagnosis::median_fit(&found)?, &camera, config.camera.width);
         let text = match (self.each.as_slice(), found.len()) {
             ([Look { name, .. }], _) => format!("in {name} {fits}"),
@@ -277,5 +280,50 @@ impl ReadAgain {
                 bars.polygons_px([width, height].map(u32::from))
             )
         })
+    }
+}
+
+/// Says that the limbs of some pictures are larger than expected and those of others smaller; `None` if a third of them
+/// at most contradicts the others, which may be clouds.
+// The median of such pictures is that of nothing: its half-angle and its altitude came from different pictures.
+fn contradicting(found: &[FitFacts], looked_at: usize) -> Option<String> {
+    let larger = found.iter().filter(|fit| fit.sigmas > 0.0).count();
+    let smaller = found.len() - larger;
+    (3 * larger.min(smaller) > found.len()).then(|| {
+        format!(
+            "the limb is larger than expected in {larger} of {looked_at} refused pictures that were looked at, and \
+             smaller in {smaller}: no altitude fits both. Check the field of view, the kind of the lens, and the \
+             altitude of each picture"
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::contradicting;
+    use hzn_run::diagnosis::FitFacts;
+
+    fn fit(sigmas: f64) -> FitFacts {
+        FitFacts {
+            expected_deg: 77.0,
+            fitted_deg: 77.0 + sigmas,
+            fitted_sigma_deg: 1.0,
+            expected_sigma_deg: 0.1,
+            sigmas,
+            is_trial: true,
+            given_altitude_km: None,
+            altitude_km: None,
+            focal_factor: None,
+            limb_height_km: None,
+        }
+    }
+
+    #[test]
+    fn limbs_that_contradict_each_other_have_no_median() {
+        let told = contradicting(&[fit(5.0), fit(-4.0)], 5).unwrap();
+        assert!(told.contains("in 1 of 5 refused pictures") && told.contains("smaller in 1:"), "{told}");
+        assert!(contradicting(&[fit(5.0), fit(4.0), fit(-4.0)], 5).is_none(), "one picture may show a cloud");
+        assert!(contradicting(&[fit(5.0), fit(4.0), fit(-4.0), fit(-6.0)], 5).is_some());
+        assert!(contradicting(&[fit(5.0)], 1).is_none() && contradicting(&[], 0).is_none());
     }
 }
