@@ -253,8 +253,8 @@ fn calibrated(args: &Args, known: &CameraFacts) -> Result<Option<String>, Stop> 
         Ok(camera) => {
             let ([width, height], (w, h)) = (known.size_px, (camera.width, camera.height));
             tell::warning(format_args!(
-                "{topic} is for {w} x {h} px and the pictures are {width} x {height}: not used. Binning and a region of \
-                 interest of such a message are not applied; hzn camera convert applies those of a YAML file"
+                "{topic} is for {w} x {h} px and the pictures are {width} x {height}: not used. Binning and a region \
+                 of interest of such a message are not applied; hzn camera convert applies those of a YAML file"
             ));
             return Ok(None);
         }

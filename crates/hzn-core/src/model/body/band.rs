@@ -28,8 +28,8 @@ const CO2_MEAN_KM: f64 = 40.0;
 const WINDOW_KM: [f64; 2] = [12.0, 7.0];
 /// Part of this sigma that is weather, 1/√2.
 // How much of the 7 km is the same along the whole limb is not known, so that half of the variance is. These 4.9 km are
-// more than the 3.2 km of heights that are evenly distributed from clear air (6 km) to the tropopause (17 km), and leave
-// room for ozone.
+// more than the 3.2 km of heights that are evenly distributed from clear air (6 km) to the tropopause (17 km), and
+// leave room for ozone.
 const WINDOW_WEATHER: f64 = core::f64::consts::FRAC_1_SQRT_2;
 /// Length of the weather, metres: that of the heads of a rig, see `limb_own_length_km` there.
 const WEATHER_LENGTH_M: f64 = 1e6;
@@ -144,7 +144,7 @@ impl Config {
 }
 
 /// Returns the square of the radius of a limb over the length of the weather.
-pub(super) fn weather_kappa<T: Real>(radius_m: T) -> T {
+pub(crate) fn weather_kappa<T: Real>(radius_m: T) -> T {
     let lengths = radius_m * T::from_f64(1.0 / WEATHER_LENGTH_M);
     (lengths * lengths).max(T::from_f64(1e-3))
 }
@@ -219,7 +219,7 @@ mod tests {
         let neither = expect(Prior { altitude_m: Some(600e3), ..Prior::default() });
         // The mean along the limb has 0.15 of the variance of the weather; the rest is along the limb.
         let local = |e: &Expected<f64>| {
-            let along = 1.0 - weather_mean_part(e.weather_kappa());
+            let along = 1.0 - weather_mean_part(weather_kappa((e.radius_m + e.limb_m) * e.cos));
             (e.limb_sigma_parts_m[0].powi(2) + e.weather_m.powi(2) * along).sqrt()
         };
         let sigma = |e: &Expected<f64>| e.limb_sigma_parts_m[0];

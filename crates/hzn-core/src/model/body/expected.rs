@@ -7,7 +7,6 @@ use crate::geometry::ellipsoid::LimbCone;
 use crate::geometry::frames::{Cam, Fixed, Rotation, UnitVec3};
 
 use super::apparent::{ApparentBody, below_limb_error};
-use super::band;
 use super::position::Target;
 use super::{Config, Kind, LOWEST_ALTITUDE_M, Last, Night, Prior, PriorError};
 
@@ -63,8 +62,7 @@ pub struct Expected<T> {
     pub(crate) unknown_harmonics_cos: [T; 2],
     /// 1-sigma of a tilt of the limb along each of two axes, metres.
     pub(crate) tilt_sigma_m: T,
-    /// 1-sigma of the weather of a thermal band along the limb, metres. The limb height has its mean; what changes
-    /// along the limb comes on top.
+    /// 1-sigma of the weather of a thermal band along the limb, metres; the limb height has its mean.
     pub(crate) weather_m: T,
     /// Threshold that the previous picture proposes, counts.
     pub(crate) level: Option<u16>,
@@ -282,11 +280,6 @@ impl<T: Real> Expected<T> {
         };
         expected.is_curved = expected.bends();
         Ok(expected)
-    }
-
-    /// Returns the square of the limb's radius over the length of the weather.
-    pub(crate) fn weather_kappa(&self) -> T {
-        band::weather_kappa((self.radius_m + self.limb_m) * self.cos)
     }
 
     /// Returns the 1-sigma of the half-angle from the limb height alone, radians: its sigma over the distance to the

@@ -28,6 +28,7 @@ use crate::geometry::ellipsoid::{EARTH_MEAN_RADIUS_M, WGS84_A_M, WGS84_B_M};
 use crate::model::edge_noise;
 use crate::model::threshold;
 
+pub(crate) use band::weather_kappa;
 pub use band::year_part;
 pub use expected::Expected;
 pub use kind::{AltitudeReference, Kind};

@@ -9,7 +9,6 @@
 //! | common tilt | g τ, τ from −1 to 1 along the edge |
 //! | common bend | g (3τ² − 1)/2, the second Legendre polynomial |
 //! | unknown azimuth | cos kφ and sin kφ of the azimuth φ about the axis, k = 1, 2 |
-//! | weather | the same, k = 1 to 12 ([`weather`](super::weather)) |
 //! | lens | g·∂u/∂p, the pixel's move for an intrinsic parameter p |
 //!
 //! The limb of an ellipsoid differs from its mean cone by a second harmonic of the azimuth. A limb height that varies
@@ -27,7 +26,6 @@
 
 use super::noise::EdgeNoiseModel;
 use super::sandwich::response;
-use super::weather;
 use crate::base::linalg::{M3, V3, basis};
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LEAST_GRADIENT2, every_weighted};
@@ -89,9 +87,6 @@ pub(super) fn add_terms<T: Real>(
         }
     }
     add(Term::UnknownAzimuth, &uneven);
-    if expected.weather_m > T::ZERO {
-        add(Term::Weather, &weather::covariance(blocks, fit, expected, &response));
-    }
     if let Some(modes) = camera.intrinsic_modes() {
         let mut lens = M3::zeros();
         for mode in modes {

@@ -124,6 +124,12 @@ fn add_to<T: Real>(
         }
         add(term, more);
     })?;
+    if expected.weather_m > T::ZERO {
+        let more = weather::covariance(blocks, fit, expected)?;
+        p.whole += more;
+        p.common += more;
+        add(Term::Weather, &more);
+    }
     uneven::add_terms(fit, expected, shown, |term, more| {
         p.late += *more;
         add(term, more);
