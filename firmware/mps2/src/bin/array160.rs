@@ -14,9 +14,9 @@ use static_cell::ConstStaticCell;
 
 const WIDTH: usize = 160;
 const HEIGHT: usize = 120;
-/// Has room for 320 border pixels of all edges, and for 512 changes between dark and lit.
-type Rows = RowBuffers<u16, { ROWS_HELD as usize * WIDTH }, HEIGHT, 512, 320>;
-/// Has room for 160 points of an edge.
+/// Has room for 320 border pixels of all edges, and for 384 changes between dark and lit.
+type Rows = RowBuffers<u16, { ROWS_HELD as usize * WIDTH }, HEIGHT, 384, 320>;
+/// Has room for 320 points of an edge.
 type Lists = Workspace<f32, 320, 20, 160>;
 
 static SENSOR: ConstStaticCell<SensorPlace<f32>> = ConstStaticCell::new(SensorPlace::empty());
