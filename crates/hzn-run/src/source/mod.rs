@@ -45,8 +45,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-#[cfg(feature = "recordings")]
 pub(crate) use arrays::{FITS_START, FitsHeader, fits_header};
+#[cfg(feature = "recordings")]
 pub use bag::{conversion, is_bag, recordings as recordings_of_bag};
 pub use bits::{FoundBits, find_bits, with_key};
 #[cfg(feature = "recordings")]
