@@ -3,8 +3,8 @@
 //! Clouds, water vapour and temperature change the height of such a limb from place to place, with the correlation
 //! exp(−d²/2L²) at the distance d. Along a limb of the radius ρ, this is a random harmonic of each degree k whose
 //! cosine and sine have the variance 2 σ² exp(−κ) I_k(κ), κ = (ρ/L)². The degree 0 is a part of the limb height.
-//! The degrees above two count: they bend a short
-//! arc more than the first two, and the fit takes a bend for another half-angle. No residual shows it.
+//! The degrees above two count: they bend a short arc more than the first two, and the fit takes a bend for another
+//! half-angle. No residual shows it.
 
 use super::common::part;
 use super::sandwich::response;
