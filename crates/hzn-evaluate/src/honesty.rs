@@ -10,7 +10,10 @@ pub struct Honesty {
     pub answers: usize,
     /// Mean NEES. 2 is ideal; with a larger mean the covariances are too small, with a smaller mean too large.
     pub nees: f64,
-    /// Interval that holds 95 % of the means if the covariances are right and the answers are independent.
+    /// Number of independent answers that would say as much about the covariance. Answers of one flight whose errors are
+    /// mostly common say little more than one of them.
+    pub independent: f64,
+    /// Interval that holds 95 % of the means if the covariances and their common parts are right.
     pub interval: [f64; 2],
     /// Factor on sigma that would give a mean of 2.
     pub sigma_scale: f64,
@@ -30,8 +33,12 @@ pub struct Within {
 }
 
 impl Honesty {
-    /// Summarises NEES values; returns `None` if there are none.
-    pub fn from_nees(nees: &[f64]) -> Option<Self> {
+    /// Summarises NEES values; returns `None` if there are none. `common` is the mean square of the share of the variance
+    /// that is common to all answers; 0 if they are independent.
+    ///
+    /// Two errors of which the share ρ of the variance is the same have NEES with the covariance 4ρ², and one NEES has the
+    /// variance 4. So the mean of n has the variance of n/(1 + (n − 1)ρ²) independent ones.
+    pub fn from_nees(nees: &[f64], common: f64) -> Option<Self> {
         let n = nees.len();
         if n == 0 {
             return None;
@@ -42,7 +49,9 @@ impl Honesty {
             expected: 1.0 - (-0.5 * sigma * sigma).exp(),
             share: nees.iter().filter(|&&x| x <= sigma * sigma).count() as f64 / n as f64,
         });
-        Some(Self { answers: n, nees: mean, interval: interval(n), sigma_scale: (mean / 2.0).sqrt(), within })
+        let independent = n as f64 / (1.0 + (n as f64 - 1.0) * common.clamp(0.0, 1.0));
+        let interval = interval(independent);
+        Some(Self { answers: n, nees: mean, independent, interval, sigma_scale: (mean / 2.0).sqrt(), within })
     }
 
     /// Returns true if the mean is within the 95 % interval.
@@ -52,10 +61,10 @@ impl Honesty {
 }
 
 /// Returns the middle 95 % of the distribution of the mean NEES of `n` independent answers: χ²(2n)/n.
-pub(crate) fn interval(n: usize) -> [f64; 2] {
+pub(crate) fn interval(n: f64) -> [f64; 2] {
     // The constructor refuses only degrees of freedom that are not above zero.
-    match ChiSquared::new(2.0 * n as f64) {
-        Ok(chi2) => [0.025, 0.975].map(|p| chi2.inverse_cdf(p) / n as f64),
+    match ChiSquared::new(2.0 * n) {
+        Ok(chi2) => [0.025, 0.975].map(|p| chi2.inverse_cdf(p) / n),
         Err(_) => [f64::NAN; 2],
     }
 }

@@ -81,13 +81,32 @@ impl Answer {
     }
 }
 
+/// Returns the mean square of the share of the variance that is common to all answers: that of the eigenvalues of P⁻¹C
+/// on the plane across the axis. An answer without a common part counts as independent of the others.
+pub(crate) fn common_square(cases: &[&Case]) -> f64 {
+    let shares = cases.iter().filter(|c| c.miss.is_some_and(|m| m.nees.is_some())).map(|case| {
+        let answer = Answer::new(case)?;
+        let across = across(&answer.axis);
+        let [whole, common] = [answer.covariance, answer.common].map(|p| across.transpose() * p * across);
+        let share = whole.cholesky()?.solve(&common);
+        Some((share * share).trace() / 2.0).filter(|x| x.is_finite())
+    });
+    let shares: Vec<f64> = shares.map(Option::unwrap_or_default).collect();
+    shares.iter().sum::<f64>() / shares.len().max(1) as f64
+}
+
+/// Returns two unit vectors across an axis, as columns.
+fn across(axis: &Vector3<f64>) -> Matrix3x2<f64> {
+    let first = axis.cross(&Vector3::ith(axis.iamin(), 1.0)).normalize();
+    Matrix3x2::from_columns(&[first, axis.cross(&first)])
+}
+
 /// Returns the NEES of the mean error, with the common part and with independent errors; `None` if a covariance is
 /// singular.
 fn nees(group: &[&Answer]) -> Option<[f64; 2]> {
     let n = group.len() as f64;
     let axis = group.iter().map(|a| a.axis).sum::<Vector3<f64>>().try_normalize(1e-12)?;
-    let first = axis.cross(&Vector3::ith(axis.iamin(), 1.0)).normalize();
-    let across = Matrix3x2::from_columns(&[first, axis.cross(&first)]);
+    let across = across(&axis);
     let tangent = |pick: fn(&Answer) -> Matrix3<f64>| -> Matrix2<f64> {
         across.transpose() * (group.iter().map(|a| pick(a)).sum::<Matrix3<f64>>() / n) * across
     };

@@ -8,7 +8,7 @@ use crate::case::{Case, Miss};
 use crate::classes::ErrorClasses;
 use crate::honesty::Honesty;
 use crate::integrity::Integrity;
-use crate::means::Means;
+use crate::means::{Means, common_square};
 use crate::position::PositionErrors;
 use crate::quantile::quantile;
 
@@ -216,7 +216,7 @@ fn classes(cases: &[&Case]) -> Option<[ErrorClasses; 2]> {
 
 fn honesty(cases: &[&Case]) -> Option<Honesty> {
     let nees: Vec<f64> = cases.iter().filter_map(|c| c.miss?.nees).collect();
-    Honesty::from_nees(&nees)
+    Honesty::from_nees(&nees, common_square(cases))
 }
 
 impl Errors {

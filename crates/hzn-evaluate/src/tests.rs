@@ -195,13 +195,15 @@ fn groups_have_nice_ranges_and_hold_every_case() {
 #[test]
 fn intervals_are_those_of_chi_square() {
     // Tables give 9.591 and 34.170 for χ² of 20 degrees of freedom at 2.5 % and 97.5 %; n = 10.
-    let [low, high] = interval(10);
+    let [low, high] = interval(10.0);
     assert!((low - 0.9591).abs() < 1e-4 && (high - 3.4170).abs() < 1e-4, "{low} {high}");
-    let h = Honesty::from_nees(&[2.0; 10]).unwrap();
+    let h = Honesty::from_nees(&[2.0; 10], 0.0).unwrap();
     assert!(h.is_within_interval() && (h.sigma_scale - 1.0).abs() < 1e-12);
     assert_eq!(h.within.map(|w| w.share), [0.0, 1.0, 1.0]);
     assert!((h.within[1].expected - 0.8647).abs() < 1e-4);
-    assert!(!Honesty::from_nees(&[8.0; 10]).unwrap().is_within_interval() && Honesty::from_nees(&[]).is_none());
+    assert!(
+        !Honesty::from_nees(&[8.0; 10], 0.0).unwrap().is_within_interval() && Honesty::from_nees(&[], 0.0).is_none()
+    );
 }
 
 #[test]
@@ -283,6 +285,21 @@ fn what_is_common_stays_in_a_mean() {
         assert!((m.nees_if_independent / n - 1.0).abs() < 1e-4, "{m:?}");
         assert_eq!(m.beyond_3_sigma, 0.0);
     }
+}
+
+/// 200 answers with the same error say little about its sigma: three quarters of the variance are one error.
+#[test]
+fn answers_with_common_errors_count_as_few() {
+    let honesty = |answers: &[Answer]| {
+        let truths: Vec<Truth> = answers.iter().map(|a| truth(&a.file, 1)).collect();
+        Evaluation::by_body(&pair(answers, &truths, None).unwrap())[0].honesty.clone().unwrap()
+    };
+    let mut answers = alike(200);
+    let h = honesty(&answers);
+    assert!((h.independent - 200.0 / (1.0 + 199.0 * 0.5625)).abs() < 1e-6 && h.is_within_interval(), "{h:?}");
+    answers.iter_mut().filter_map(|a| a.found.as_mut()).for_each(|f| f.common_rad2 = None);
+    let h = honesty(&answers);
+    assert!(h.independent == 200.0 && !h.is_within_interval(), "{h:?}");
 }
 
 #[test]

@@ -189,14 +189,23 @@ fn position_lines(e: &Evaluation) -> Vec<(&'static str, String)> {
 /// Returns the meaning of the mean NEES in words.
 pub(super) fn verdict(h: &Honesty) -> &'static str {
     match h {
+        h if h.is_within_interval() && is_few(h) => "nothing speaks against sigma",
         h if h.is_within_interval() => "covariance is right",
         h if h.nees > h.interval[1] => "sigma is too small",
         _ => "sigma is larger than it needs to be",
     }
 }
 
+/// Returns whether the answers say less about their covariance than half of them would if they were independent.
+fn is_few(h: &Honesty) -> bool {
+    h.independent < 0.5 * h.answers as f64
+}
+
 fn nees(h: &Honesty) -> String {
-    format!("{:.2}; expected mean {:.2} to {:.2} (95 %)", h.nees, h.interval[0], h.interval[1])
+    let [low, high] = h.interval;
+    let common = format!("; errors in common: as {:.1} independent answers", h.independent);
+    let few = if is_few(h) { common.as_str() } else { "" };
+    format!("{:.2}; expected mean {low:.2} to {high:.2} (95 %{few})", h.nees)
 }
 
 /// Columns of a group's table.
