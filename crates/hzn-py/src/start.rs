@@ -8,7 +8,7 @@ use hzn_files::sensor;
 use hzn_files::start::{Body, CameraFacts, write_sensor_toml};
 use hzn_run::open::Request;
 use hzn_run::source;
-use hzn_run::start::{LimbSays, describe_doubt, measure_field_of_view, read_camera_facts};
+use hzn_run::start::{LimbSays, find_doubt, measure_field_of_view, read_camera_facts};
 use pyo3::prelude::*;
 
 use crate::errors;
@@ -44,9 +44,22 @@ pub(crate) struct Said<'a> {
 
 /// Returns the parameters that `hzn init` writes for this camera.
 pub(crate) fn make(py: Python<'_>, said: &Said<'_>) -> PyResult<Config> {
-    let known = errors::detached(py, || complete(said))??;
-    let start = write_sensor_toml(&known).map_err(|why| errors::config(in_python(&why)))?;
-    let parsed = sensor::parse(&start.text, Path::new("Sensor.start")).map_err(errors::config)?;
+    let mut known = errors::detached(py, || complete(said))??;
+    let write = |known: &CameraFacts| {
+        let start = write_sensor_toml(known).map_err(|why| errors::config(in_python(&why)))?;
+        let parsed = sensor::parse(&start.text, Path::new("Sensor.start")).map_err(errors::config)?;
+        PyResult::Ok((start, parsed))
+    };
+    let (mut start, mut parsed) = write(&known)?;
+    if known.has_focal() && !said.pictures.is_empty() {
+        let request = said.request();
+        let doubt = errors::detached(py, || find_doubt(&request, &known, &start, &parsed.config))?;
+        if let Some(doubt) = doubt.map_err(errors::image)? {
+            errors::warn(py, in_python(&doubt.text))?;
+            known.doubt_percent = Some(doubt.focal_percent);
+            (start, parsed) = write(&known)?;
+        }
+    }
     start.warnings.iter().try_for_each(|warning| errors::warn(py, in_python(warning)))?;
     parsed.warnings.iter().try_for_each(|warning| errors::warn(py, warning))?;
     if known.exif.turned {
@@ -54,11 +67,6 @@ pub(crate) fn make(py: Python<'_>, said: &Said<'_>) -> PyResult<Config> {
             py,
             "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
         )?;
-    }
-    if known.has_focal() && !said.pictures.is_empty() {
-        let request = said.request();
-        let doubt = errors::detached(py, || describe_doubt(&request, &known, &start, &parsed.config))?;
-        doubt.map_err(errors::image)?.iter().try_for_each(|doubt| errors::warn(py, in_python(doubt)))?;
     }
     Ok(parsed.config)
 }

@@ -165,19 +165,29 @@ fn find_altitude(
     }))
 }
 
-/// Says in words that the limb contradicts the field of view (that was told, or that of the EXIF) or the altitude, with
-/// the values that would fit. `config` is the sensor that was made from `start`. `None` if they agree, or if the limb
+/// A contradiction between the limb and what was told.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Doubt {
+    /// What contradicts what, with the values that would fit, in words.
+    pub text: String,
+    /// 1-sigma in percent that is to be added to that of the focal length: with it, the difference is just not worth a
+    /// warning.
+    pub focal_percent: f64,
+}
+
+/// Finds out whether the limb contradicts the field of view (that was told, or that of the EXIF) or the altitude, and
+/// which values would fit. `config` is the sensor that was made from `start`. `None` if they agree, or if the limb
 /// says nothing.
 ///
 /// # Errors
 /// A file cannot be read.
-pub fn describe_doubt(
+pub fn find_doubt(
     request: &Request,
     known: &CameraFacts,
     start: &StartConfig,
     config: &hzn_core::Config,
-) -> Result<Option<String>, Error> {
-    let Some(limb) = doubt_field_of_view(request, known, start)? else { return Ok(None) };
+) -> Result<Option<Doubt>, Error> {
+    let Some((limb, focal_percent)) = doubt_field_of_view(request, known, start)? else { return Ok(None) };
     let [kept, seen] = limb.pictures;
     let altitude = find_altitude(request, known, config)?.map(|altitude| {
         let FittingAltitude { given_km, fitting_km: Implied { value, sigma }, pictures } = altitude;
@@ -186,18 +196,20 @@ pub fn describe_doubt(
              not {given_km:.0} km"
         )
     });
-    Ok(Some(format!(
+    let text = format!(
         "the limb in {kept} of {seen} pictures contradicts the field of view or the altitude. If the altitude is \
          right, the pictures are {}, not {:.1} degrees{}. Check both, and the kind of lens (the field of view of a \
-         fisheye is not 2 atan(width / 2f)); without --fov, that of the limb is taken",
+         fisheye is not 2 atan(width / 2f)); without --fov, that of the limb is taken. The sigma of the focal length is \
+         larger for that, so that answers with it are possible, but less accurate",
         limb.describe(known.size_px[0]),
         start.fov_deg,
         altitude.unwrap_or_default()
-    )))
+    );
+    Ok(Some(Doubt { text, focal_percent }))
 }
 
-/// Compares a field of view that was told (or that of the EXIF) with that of the limb. Returns the latter if the two
-/// disagree; `None` if they agree, or if the limb says nothing.
+/// Compares a field of view that was told (or that of the EXIF) with that of the limb. Returns the latter if the
+/// two disagree, with the 1-sigma in percent that would explain it; `None` if they agree, or if the limb says nothing.
 ///
 /// # Errors
 /// A file cannot be read.
@@ -205,11 +217,11 @@ fn doubt_field_of_view(
     request: &Request,
     known: &CameraFacts,
     start: &StartConfig,
-) -> Result<Option<FieldOfView>, Error> {
+) -> Result<Option<(FieldOfView, f64)>, Error> {
     let without = CameraFacts { fov_deg: None, exif: Exif::default(), lens: Some(start.lens), ..known.clone() };
     let LimbSays::FieldOfView(found) = measure_field_of_view(request, &without)? else { return Ok(None) };
     let of_limb = start::focal_px(start.lens, f64::from(known.size_px[0]), found.measured.fov_deg);
     let sigma = 0.01 * found.measured.focal_sigma_percent.hypot(start.focal_sigma_percent);
-    let is_doubtful = of_limb.is_some_and(|px| (px / start.focal_px).ln().abs() > DOUBTFUL_SIGMAS * sigma);
-    Ok(is_doubtful.then_some(found))
+    let needed = of_limb.map(|px| (px / start.focal_px).ln().abs() / DOUBTFUL_SIGMAS).filter(|needed| *needed > sigma);
+    Ok(needed.map(|needed| (found, 100.0 * (needed * needed - sigma * sigma).sqrt())))
 }

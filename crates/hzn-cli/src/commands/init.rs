@@ -10,7 +10,7 @@ use hzn_files::{Problem, plausible};
 use hzn_run::diagnosis::FieldOfView;
 use hzn_run::open::{self, Request};
 use hzn_run::source::{self, Source};
-use hzn_run::start::{LimbSays, describe_doubt, measure_field_of_view, read_camera_facts};
+use hzn_run::start::{LimbSays, find_doubt, measure_field_of_view, read_camera_facts};
 use hzn_run::{disk, explain};
 
 use super::init_rig;
@@ -137,15 +137,20 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(found) = &found {
         (known.lens, known.measured) = (Some(found.lens), Some(found.measured));
     }
-    let start = start::write_sensor_toml(&known).map_err(usage)?;
+    let mut start = start::write_sensor_toml(&known).map_err(usage)?;
     // What the file says is checked before it is written: a refused file helps nobody.
     let parsed = hzn_files::sensor::parse(&start.text, args.output())?;
+    let is_stated = known.has_focal();
+    let doubt = if is_stated { find_doubt(&request(args), &known, &start, &parsed.config)? } else { None };
+    if let Some(doubt) = &doubt {
+        known.doubt_percent = Some(doubt.focal_percent);
+        start = start::write_sensor_toml(&known).map_err(usage)?;
+        hzn_files::sensor::parse(&start.text, args.output())?;
+    }
     write(&start.text)?;
     start.warnings.iter().for_each(tell::warning);
     tell_turn(&known);
-    if known.has_focal() {
-        describe_doubt(&request(args), &known, &start, &parsed.config)?.iter().for_each(tell::warning);
-    }
+    doubt.iter().for_each(|doubt| tell::warning(&doubt.text));
     if let Some(found) = &found {
         let [kept, seen] = found.pictures;
         tell::line(format_args!("the limb in {kept} of {seen} pictures says: {}", found.describe(known.size_px[0])));

@@ -28,6 +28,8 @@ pub struct CameraFacts {
     pub body: Body,
     /// Field of view that the limb in the pictures says. It is used if neither a field of view nor EXIF is known.
     pub measured: Option<MeasuredFov>,
+    /// 1-sigma in percent that is added to that of a stated focal length, because the limb contradicts it.
+    pub doubt_percent: Option<f64>,
     /// Radius about the picture's centre beyond which no light arrives, in pixels, if the pictures show it. The file of
     /// a fisheye limits the lens to it.
     pub image_circle_px: Option<f64>,
@@ -51,6 +53,7 @@ impl CameraFacts {
             altitude_km: None,
             body: Body::default(),
             measured: None,
+            doubt_percent: None,
             image_circle_px: None,
             bars: None,
             pixel_aspect: 1.0,

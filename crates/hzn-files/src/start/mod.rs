@@ -70,7 +70,11 @@ pub fn write_sensor_toml(facts: &CameraFacts) -> Result<StartConfig, String> {
         })
     });
     let known = stated.transpose()?.or(measured.filter(|_| exif.is_err()));
-    let (focal, warnings, comparison) = choose_focal(known, exif, lens, width)?;
+    let (mut focal, warnings, comparison) = choose_focal(known, exif, lens, width)?;
+    if let Some(percent) = facts.doubt_percent {
+        (focal.percent, focal.sigma_from) =
+            (focal.percent.hypot(percent), "a stated field of view that the limb contradicts");
+    }
     let guess = Guess::new(facts, lens, &focal);
     let fov_deg = fov_deg(lens, width, focal.px);
     let circle = ImageCircle::choose(facts.image_circle_px, &guess.camera, fov_deg);
