@@ -3,7 +3,7 @@
 use hzn_core::config::Input;
 use hzn_core::image::{Channel, ImageView, Layout, Pixels};
 use hzn_mcap::words_from_floats;
-use hzn_run::source::picture;
+use hzn_run::source::{Levels, picture};
 use numpy::ndarray::{Array3, ArrayD, ArrayView3, ArrayViewD, Axis, Ix2, Ix3};
 use numpy::{
     IntoPyArray, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
@@ -115,7 +115,7 @@ impl<'py> Array<'py> {
     /// given.
     pub(crate) fn unused_bits(&self, bits: Option<u8>) -> Option<String> {
         match self {
-            Self::Words(a) if bits.is_none() => picture::unused_bits(a.as_array().iter().copied().max()?),
+            Self::Words(a) if bits.is_none() => a.as_array().iter().copied().collect::<Levels>().advice(),
             _ => None,
         }
     }

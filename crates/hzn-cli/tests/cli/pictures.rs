@@ -94,6 +94,10 @@ fn bits_are_found_once_for_a_sequence() {
     }
     // A thermal camera has a range of 1200 counts far above 0.
     assert_eq!(bits_of(&|v| 7000 + v * 5, &|v| 7000 + v * 5), "14");
+    // A library of industrial cameras shifts 12 bits up, and the pictures are dark.
+    let place = Place::without_tone();
+    words(0.0, |v| (2 * v) << 4).save(place.path("in/0.png")).unwrap();
+    place.run(&["run", "in"]).expect(0).says("all samples are multiples of 32").says("set bits = 16");
 }
 
 #[test]

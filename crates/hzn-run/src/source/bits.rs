@@ -1,12 +1,14 @@
 //! Finds how many bits of 16-bit words a camera uses, once for a whole sequence.
 //!
 //! A camera with 10, 12 or 14 bits often writes its counts into the lower bits of words. Full scale is then not 65535,
-//! and thresholds given as fractions of 65535 would be far too high. One picture is not enough, because it may be dark.
+//! and thresholds given as fractions of 65535 would be far too high. Others shift them into the upper bits; then it is.
+//! Dark pictures of the two kinds look alike, and the user is told. One picture is not enough, because it may be dark.
 //! Therefore pictures are sampled evenly from the whole sequence, by their place in it, and the result holds for all
 //! pictures.
 
 use hzn_core::Config;
 
+use super::levels::{Levels, of_upper_bits};
 use super::sequence::Source;
 
 /// Number of pictures that are examined. If the input is one picture, it is examined in addition to those of its
@@ -26,17 +28,20 @@ pub struct FoundBits {
     pub largest_sample: u16,
     /// Number of pictures that were examined.
     pub pictures: usize,
+    /// Number of the camera's bits if they are probably the upper ones of the words, see [`Levels::upper_bits`].
+    pub upper_bits: Option<u8>,
 }
 
 impl std::fmt::Display for FoundBits {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { bits, largest_sample, pictures } = self;
+        let Self { bits, largest_sample, pictures, upper_bits } = self;
         let examined = crate::explain::counted(*pictures as u64, "picture");
         write!(
             f,
             "the largest 16-bit sample in {examined} is {largest_sample}: the camera is assumed to have {bits} bits; \
              if it has another number, set bits = ... in [input] of sensor.toml"
-        )
+        )?;
+        upper_bits.map_or(Ok(()), |upper| write!(f, "; {}", of_upper_bits(upper)))
     }
 }
 
@@ -46,17 +51,22 @@ pub fn find_bits(source: &dyn Source, sensor: &Config) -> Option<FoundBits> {
     if source.bits().is_some() {
         return None;
     }
-    let (mut largest_sample, mut pictures) = (0, 0);
+    let (mut levels, mut pictures) = (Levels::default(), 0);
     for (i, payload) in source.samples().take(MAX_EXAMINED + 1).enumerate() {
-        match payload.largest_word(sensor) {
-            Some(word) => (largest_sample, pictures) = (word.max(largest_sample), pictures + 1),
+        match payload.levels(sensor) {
+            Some(more) => {
+                levels.add(&more);
+                pictures += 1;
+            }
             None if pictures == 0 && i + 1 >= MAX_PICTURES_WITHOUT_WORDS => return None,
             None => {}
         }
     }
-    let bits = BITS.into_iter().find(|bits| u32::from(largest_sample) >> bits == 0)?;
+    let largest_sample = levels.largest;
+    let fits = |bits: &u8| u32::from(largest_sample) >> bits == 0;
+    let bits = BITS.into_iter().find(fits)?;
     // Black pictures contain no information about the bits.
-    (largest_sample > 0).then_some(FoundBits { bits, largest_sample, pictures })
+    (largest_sample > 0).then_some(FoundBits { bits, largest_sample, pictures, upper_bits: levels.upper_bits() })
 }
 
 /// Returns the text of a sensor.toml with this key set in a section. Text that is not TOML is returned unchanged.

@@ -9,6 +9,7 @@ use hzn_core::tone::Tone;
 use hzn_files::start::Exif;
 use hzn_mcap::{EncodedImage, ImageFormat};
 
+use super::levels::Levels;
 use super::memory::Held;
 use super::paths::open_file;
 use super::picture::{Picture, Samples};
@@ -102,16 +103,18 @@ impl Payload {
         }
     }
 
-    /// Returns the largest sample of a picture of 16-bit words. Returns `None` for any other or unreadable picture.
-    pub(super) fn largest_word(self, sensor: &Config) -> Option<u16> {
+    /// Returns the levels of a picture of 16-bit words; of one that states its white value, only that. Returns `None` for
+    /// any other or unreadable picture.
+    pub(super) fn levels(self, sensor: &Config) -> Option<Levels> {
+        let white = || Some([u16::MAX].into_iter().collect());
         match &self {
             Self::File(path) if !header::has_words(open_file(path).ok()?) => return None,
-            Self::File(path) if header::has_white_value(open_file(path).ok()?) => return Some(u16::MAX),
+            Self::File(path) if header::has_white_value(open_file(path).ok()?) => return white(),
             Self::Encoded(bytes) if !header::has_words(std::io::Cursor::new(bytes)) => return None,
-            Self::Encoded(bytes) if header::has_white_value(bytes.as_slice()) => return Some(u16::MAX),
+            Self::Encoded(bytes) if header::has_white_value(bytes.as_slice()) => return white(),
             _ => {}
         }
-        self.decode_as_stored(stored_size(sensor), &mut Held::default()).ok()?.0.largest_word()
+        self.decode_as_stored(stored_size(sensor), &mut Held::default()).ok()?.0.levels()
     }
 
     fn decode_as_stored(

@@ -5,8 +5,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use hzn_core::image::{Channel, ImageError, ImageView, Layout};
 use image::metadata::Orientation;
 
-/// If at least this many upper bits are unused, this is not by chance.
-const UNUSED_BITS: u32 = 2;
+use super::levels::Levels;
 
 /// Samples of a picture, packed.
 #[derive(Debug, Clone)]
@@ -49,10 +48,20 @@ impl Picture {
 
     /// Returns the largest sample of a picture of words, without the transparency channel.
     pub fn largest_word(&self) -> Option<u16> {
+        self.words()?.max()
+    }
+
+    /// Returns the levels of a picture of words, without the transparency channel.
+    pub fn levels(&self) -> Option<Levels> {
+        self.words().map(Levels::from_iter)
+    }
+
+    /// Returns the samples of a picture of words, without the transparency channel.
+    fn words(&self) -> Option<impl Iterator<Item = u16>> {
         let Samples::Words(words) = &self.samples else { return None };
         let channels = usize::from(self.layout.channels.max(1));
         let bright = if channels.is_multiple_of(2) { channels - 1 } else { channels };
-        words.chunks_exact(channels).flat_map(|pixel| pixel.iter().take(bright)).copied().max()
+        Some(words.chunks_exact(channels).flat_map(move |pixel| pixel.iter().take(bright)).copied())
     }
 
     /// Returns the sum of the colours of a pixel, without transparency; 0 outside of the picture.
@@ -100,8 +109,7 @@ impl Picture {
     /// Returns advice for a picture without an answer whose upper bits are all unused, if the number of bits is not
     /// known.
     pub fn unused_bits(&self) -> Option<String> {
-        let largest = self.largest_word()?;
-        if self.layout.bits == 16 { unused_bits(largest) } else { None }
+        self.levels().filter(|_| self.layout.bits == 16)?.advice()
     }
 
     /// Returns a view of the picture for the pipeline.
@@ -160,15 +168,4 @@ impl Picture {
             .map_err(|e| e.to_string())?;
         Ok(out)
     }
-}
-
-/// Returns advice if samples of 16 bits reach no more than `largest`, and the number of bits is not known.
-pub fn unused_bits(largest: u16) -> Option<String> {
-    let bits = (16 - largest.leading_zeros()).max(8);
-    (bits + UNUSED_BITS <= 16).then(|| {
-        format!(
-            "the largest sample is {largest} of 65535: if the camera has fewer bits than the file, set bits = {bits} \
-             in [input] of sensor.toml"
-        )
-    })
 }
