@@ -30,7 +30,7 @@ fn coverage(distance: f64, radius: f64) -> f64 {
 }
 
 /// Returns the distance of a point from a segment, in pixels.
-fn distance(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
+pub(super) fn distance(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     let along = [b[0] - a[0], b[1] - a[1]];
     let square = along[0] * along[0] + along[1] * along[1];
     let part = ((p[0] - a[0]) * along[0] + (p[1] - a[1]) * along[1]) / square;

@@ -5,7 +5,7 @@ use hzn_mcap::palette::{AXIS, INLIER, LIMB, REJECTED};
 use hzn_mcap::{Annotations, Row};
 use image::{Rgb, RgbImage};
 
-use super::canvas::Colour;
+use super::canvas::{Colour, distance};
 use super::colours::{TRUTH, edge_colour};
 use super::letters::{Letters, fill};
 
@@ -117,10 +117,35 @@ pub fn legend(drawing: &Annotations) -> Vec<Entry> {
         (edges > 0, entry("edges", edges, several)),
         (!drawing.inliers.is_empty(), entry("inliers", drawing.inliers.len(), vec![INLIER])),
         (!drawing.rejected.is_empty(), entry("outliers", drawing.rejected.len(), vec![REJECTED])),
-        (!drawing.limb.is_empty(), entry("fitted limb", 0, vec![LIMB])),
+        (!drawing.limb.is_empty(), entry(&limb_in_words(drawing), 0, vec![LIMB])),
         (!drawing.axes.is_empty(), entry("axis", 0, vec![AXIS])),
     ];
     entries.into_iter().filter(|(there, _)| *there).map(|(_, entry)| entry).collect()
+}
+
+/// A line of the limb is at least twice as wide. The points beside it are then seen to lie beside it.
+const SEEN_PX: f64 = 2.5;
+
+/// Returns the name of the line of the limb. It is drawn where the answer has it, and the answer also weighs the altitude
+/// and the errors of the lens: the points can lie beside it.
+fn limb_in_words(drawing: &Annotations) -> String {
+    match distance_px(drawing) {
+        Some(px) if px > SEEN_PX => format!("limb of the answer, {px:.0} px from its points"),
+        _ => "fitted limb".into(),
+    }
+}
+
+/// Returns the median distance of the inliers from the line of the limb; `None` without both.
+fn distance_px(drawing: &Annotations) -> Option<f64> {
+    // Some points tell the distance as well as all.
+    let step = drawing.inliers.len().div_ceil(50).max(1);
+    let nearest = |point: &[f64; 2]| {
+        let segments = drawing.limb.iter().flat_map(|line| line.windows(2));
+        segments.map(|pair| distance(*point, pair[0], pair[1])).min_by(f64::total_cmp)
+    };
+    let mut all: Vec<f64> = drawing.inliers.iter().step_by(step).filter_map(nearest).collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied()
 }
 
 /// Returns the height of a line in pixels for a picture of this size.
@@ -240,6 +265,23 @@ mod tests {
         let long = "ended at gates: residuals, short-arc, no-fit, short-arc, short-arc";
         assert_eq!(shorten_detail(long), "ended at gates: residuals, short-arc ×3, no-fit");
         assert_eq!(shorten_detail("ended at contour"), "ended at contour");
+    }
+
+    #[test]
+    fn points_beside_the_limb_of_the_answer_are_said_to_be_there() {
+        let limb = vec![vec![[0.0, 100.0], [300.0, 100.0]], vec![[310.0, 100.0], [640.0, 100.0]]];
+        let drawing = |off: f64| Annotations {
+            limb: limb.clone(),
+            inliers: (0..600).map(|u| [f64::from(u), 100.0 + off]).collect(),
+            ..Annotations::default()
+        };
+        let name = |off: f64| legend(&drawing(off)).pop().unwrap().name;
+        assert_eq!(
+            (name(1.0), name(-14.0)),
+            ("fitted limb".into(), "limb of the answer, 14 px from its points".into())
+        );
+        let alone = Annotations { inliers: vec![], ..drawing(0.0) };
+        assert_eq!(legend(&alone).pop().unwrap().name, "fitted limb");
     }
 
     #[test]
