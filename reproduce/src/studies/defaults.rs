@@ -84,9 +84,13 @@ impl Rendered {
         if self.rates { sensor } else { sensor.without_rates() }
     }
 
-    /// Returns the configuration of a user who knows the camera and its mask: every other key is the default.
+    /// Returns the configuration of a user who knows the camera and its mask: every other key is the default. The program
+    /// finds the tone from the files.
     pub(super) fn default_sensor(&self) -> Config {
-        Config { mask: self.flight.sensor.mask.clone(), ..Config::new(self.flight.sensor.camera.clone()) }
+        let camera = self.flight.sensor.camera.clone();
+        let mut sensor = Config { mask: self.flight.sensor.mask.clone(), ..Config::new(camera) };
+        sensor.input.tone = self.flight.sensor.input.tone;
+        sensor
     }
 
     /// Returns the sensor that `hzn simulate` would write after it has measured this flight with its truth.

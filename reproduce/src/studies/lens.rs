@@ -46,9 +46,11 @@ impl Rendered {
         Ok(Self { flight, pictures, limb_km })
     }
 
-    /// Returns a sensor that knows this lens; every other key is the default.
+    /// Returns a sensor that knows this lens; every other key is the default. The program finds the tone from the files.
     fn sensor(&self, lens: camera::Config) -> Config {
-        Config { mask: self.flight.sensor.mask.clone(), ..Config::new(lens) }
+        let mut sensor = Config { mask: self.flight.sensor.mask.clone(), ..Config::new(lens) };
+        sensor.input.tone = self.flight.sensor.input.tone;
+        sensor
     }
 
     fn lens(&self) -> &camera::Config {
