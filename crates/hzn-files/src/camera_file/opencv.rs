@@ -79,7 +79,15 @@ fn read_window(
     // A window of 0 pixels is the full picture, and a binning of 0 is none.
     let binning =
         [whole(top.get("binning_x"), "binning_x")?.max(1.0), whole(top.get("binning_y"), "binning_y")?.max(1.0)];
-    let side = |k: usize| ((if window[k] > 0.0 { window[k] } else { size[k] }) / binning[k]).floor();
+    let cut = |k: usize| if window[k] > 0.0 { window[k] } else { size[k] };
+    for (k, (field, lines)) in [("roi.x_offset", "columns"), ("roi.y_offset", "rows")].into_iter().enumerate() {
+        if offset[k] + cut(k) > size[k] {
+            let (from, n, all) = (offset[k], cut(k), size[k]);
+            let what = format!("{n} {lines} from {from} on do not lie in the whole picture, which has {all} {lines}");
+            return Err(reader.problem(field, what));
+        }
+    }
+    let side = |k: usize| (cut(k) / binning[k]).floor();
     let centre = |k: usize, c: f64| (c - offset[k]) / binning[k];
     Ok(([side(0), side(1)], [fx / binning[0], fy / binning[1], centre(0, cx), centre(1, cy)]))
 }

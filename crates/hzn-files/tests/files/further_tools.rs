@@ -135,6 +135,14 @@ fn ros_binning_and_window() {
     });
     let wrong = read(&format!("{text}binning_x: 1.5\n")).unwrap_err();
     assert_eq!(wrong, "camera: binning_x: a whole number of pixels is expected");
+    // A window lies in the picture. Without a size of its own it is the whole picture, which cannot begin elsewhere.
+    for (roi, what) in [
+        ("{x_offset: 300, width: 1000, height: 960}", "x_offset: 1000 columns from 300 on do not lie in the whole"),
+        ("{y_offset: 1}", "y_offset: 960 rows from 1 on do not lie in the whole picture, which has 960 rows"),
+    ] {
+        let wrong = read(&format!("{text}roi: {roi}\n")).unwrap_err();
+        assert!(wrong.starts_with(&format!("camera: roi.{what}")), "{wrong}");
+    }
 }
 
 /// Metashape's manual, appendix "Camera models": p1 and p2 are OpenCV's p2 and p1.
