@@ -1,8 +1,8 @@
 //! The part of ROS 2's CDR encoding that pictures, calibrations, inertial units and receivers need.
 
-use crate::camera_info::CameraInfo;
+use crate::camera_info::{CameraInfo, Region};
 use crate::frame::EncodedImage;
-use crate::header::Header;
+use crate::header::{Decoded, Header};
 use crate::messages::compressed_format;
 use crate::raw_images::raw_format;
 
@@ -62,35 +62,62 @@ impl<'a> Cdr<'a> {
     /// Reads a std_msgs/Header.
     fn header(&mut self) -> Option<Header> {
         let time = (self.u32()? as i32, self.u32()?);
-        Some(Header { time: Some(time), frame_id: self.text()?.to_owned() })
+        // A name that is no UTF-8 is no reason to lose the message.
+        let frame_id = self.blob().map(|name| String::from_utf8_lossy(name.strip_suffix(&[0]).unwrap_or(name)));
+        Some(Header { time: Some(time), frame_id: frame_id.unwrap_or_default().into_owned() })
     }
 }
 
+/// Reason for a message that is shorter than its fields.
+const SHORT: &str = "the message ends too early";
+
 /// Reads a picture and its header from `sensor_msgs/msg/Image` or `sensor_msgs/msg/CompressedImage`.
-pub(crate) fn parse_image(schema: &str, message: &[u8]) -> Result<(EncodedImage, Header), String> {
-    let short = || "the message ends too early".to_owned();
-    let mut c = Cdr::try_new(message).ok_or_else(|| "unknown CDR encapsulation".to_owned())?;
-    let head = c.header().ok_or_else(short)?;
+pub(crate) fn parse_image(schema: &str, message: &[u8]) -> Decoded {
+    let Some(mut c) = Cdr::try_new(message) else { return Decoded::without_header("unknown CDR encapsulation") };
+    let Some(header) = c.header() else { return Decoded::without_header(SHORT) };
+    Decoded { image: parse_pixels(schema, &mut c), header: Some(header) }
+}
+
+/// Reads what follows the header.
+fn parse_pixels(schema: &str, c: &mut Cdr<'_>) -> Result<EncodedImage, String> {
+    let short = || SHORT.to_owned();
     if schema == "sensor_msgs/msg/CompressedImage" {
         let (format, data) = c.text().zip(c.blob()).ok_or_else(short)?;
-        return Ok((EncodedImage { format: compressed_format(format), bytes: data.to_vec() }, head));
+        return Ok(EncodedImage { format: compressed_format(format), bytes: data.to_vec() });
     }
     let fields = (|| Some((c.u32()?, c.u32()?, c.text()?, c.u8()?, c.u32()?, c.blob()?)))();
     let (height, width, encoding, big_endian, step, data) = fields.ok_or_else(short)?;
-    Ok((raw_format(width, height, step, encoding, big_endian != 0, data)?, head))
+    raw_format(width, height, step, encoding, big_endian != 0, data)
 }
 
 /// Largest number of coefficients of a distortion; the models of ROS have at most 14.
 const MAX_COEFFICIENTS: usize = 64;
 
-/// Reads a `sensor_msgs/msg/CameraInfo` up to its camera matrix; `None` if it ends too early.
-pub(crate) fn parse_camera_info(message: &[u8]) -> Option<CameraInfo> {
-    let mut c = Cdr::try_new(message)?;
-    c.header()?;
-    let (height, width, model) = (c.u32()?, c.u32()?, c.text()?.to_owned());
-    let count = Some(c.u32()? as usize).filter(|count| *count <= MAX_COEFFICIENTS)?;
-    let distortion = (0..count).map(|_| c.f64()).collect::<Option<_>>()?;
-    Some(CameraInfo { size_px: [width, height], model, distortion, matrix: c.numbers()? })
+/// Reads a `sensor_msgs/msg/CameraInfo`.
+pub(crate) fn parse_camera_info(message: &[u8]) -> Result<CameraInfo, String> {
+    let mut c = Cdr::try_new(message).ok_or("unknown CDR encapsulation")?;
+    let (size_px, model, count) = (|| {
+        c.header()?;
+        let (height, width) = (c.u32()?, c.u32()?);
+        Some(([width, height], c.text()?.to_owned(), c.u32()? as usize))
+    })()
+    .ok_or(SHORT)?;
+    if count > MAX_COEFFICIENTS {
+        return Err(format!("d has {count} coefficients; a lens of ROS has at most 14"));
+    }
+    let rest = (|| {
+        let distortion = (0..count).map(|_| c.f64()).collect::<Option<_>>()?;
+        let matrix = c.numbers()?;
+        // The rotation of the rectification.
+        c.numbers::<9>()?;
+        let projection = c.numbers()?;
+        let binning = [c.u32()?, c.u32()?];
+        let offset_px = [c.u32()?, c.u32()?];
+        let (height, width) = (c.u32()?, c.u32()?);
+        let roi = Region { offset_px, size_px: [width, height] };
+        Some(CameraInfo { size_px, model, distortion, matrix, projection, binning, roi })
+    })();
+    rest.ok_or_else(|| SHORT.to_owned())
 }
 
 /// Reads a `sensor_msgs/msg/Imu`: header, rates and specific forces. `None` if it ends too early.
@@ -164,11 +191,28 @@ mod tests {
     #[test]
     fn a_ros_image_is_read_and_a_cut_one_is_not() {
         let m = message();
-        let (image, head) = parse_image("sensor_msgs/msg/Image", &m).unwrap();
-        assert_eq!((image.format, image.bytes), (ImageFormat::Mono8 { width: 2, height: 1 }, vec![7, 9]));
-        assert_eq!((head.time, head.frame_id.as_str()), (Some((12, 500_000_000)), "cam"));
+        let read = |m: &[u8]| parse_image("sensor_msgs/msg/Image", m);
+        let Decoded { image, header } = read(&m);
+        let expected = EncodedImage { format: ImageFormat::Mono8 { width: 2, height: 1 }, bytes: vec![7, 9] };
+        assert_eq!(image, Ok(expected.clone()));
+        let time = Some((12, 500_000_000));
+        assert_eq!(header, Some(Header { time, frame_id: "cam".into() }));
         for n in 0..m.len() {
-            assert!(parse_image("sensor_msgs/msg/Image", &m[..n]).is_err(), "{n}");
+            let cut = read(&m[..n]);
+            assert!(cut.image.is_err(), "{n}");
+            // The stamp is the first field: the encapsulation and eight bytes.
+            assert_eq!(cut.header.and_then(|header| header.time), time.filter(|_| n >= 12), "{n}");
         }
+        // The stamp is there for an encoding that hzn does not know, and for a name that is no UTF-8.
+        let at = m.windows(5).position(|w| w == b"mono8").unwrap();
+        let mut other = m.clone();
+        other[at] = b'?';
+        let Decoded { image, header } = read(&other);
+        assert!(image.unwrap_err().contains("encoding \"?ono8\""));
+        assert_eq!(header.unwrap().time, time);
+        let mut other = m.clone();
+        other[16] = 0xff;
+        let Decoded { image, header } = read(&other);
+        assert_eq!((image, header.unwrap().frame_id), (Ok(expected), "\u{fffd}am".to_owned()));
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::frame::EncodedImage;
 
-/// The header of a picture's message.
+/// The header of a message.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Header {
     /// Seconds and nanoseconds, if the message has a time that counts.
@@ -11,5 +11,25 @@ pub(crate) struct Header {
     pub(crate) frame_id: String,
 }
 
-/// A decoded picture with its header; or the reason why it cannot be decoded.
-pub(crate) type Decoded = Result<(EncodedImage, Header), String>;
+impl Header {
+    /// Returns the stamp; `None` for one of 0, by which ROS says that nobody filled it in.
+    pub(crate) fn stamp(&self) -> Option<(i32, u32)> {
+        self.time.filter(|time| *time != (0, 0))
+    }
+}
+
+/// A decoded message of a picture. The header can be read even where the picture cannot.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Decoded {
+    /// The picture; or the reason why it cannot be decoded.
+    pub(crate) image: Result<EncodedImage, String>,
+    /// The header; `None` if it cannot be read either.
+    pub(crate) header: Option<Header>,
+}
+
+impl Decoded {
+    /// Creates a message that has no readable header.
+    pub(crate) fn without_header(why: impl Into<String>) -> Self {
+        Self { image: Err(why.into()), header: None }
+    }
+}

@@ -14,8 +14,9 @@ use crate::error::Error;
 use crate::frame::CandidateEdge;
 use crate::images::decoder;
 use crate::messages;
-use crate::pictures::{Pictures, Place, fill, next_record};
+use crate::pictures::{Pictures, Place, next_record};
 use crate::row::Row;
+use crate::summary::{self, fill};
 use crate::topics::Topic;
 use crate::writer::SENSOR_TOML;
 
@@ -325,19 +326,17 @@ impl Index {
     /// when the first reports come, after many pictures.
     fn read_summary(&mut self) -> io::Result<()> {
         let beginning = self.position;
-        // The footer is a record of 20 bytes. The magic bytes follow it.
-        const END_BYTES: usize = 9 + 20 + MAGIC.len();
-        let mut end = [0; END_BYTES];
-        let size = self.file.get_ref().metadata()?.len();
-        let Some(footer) = size.checked_sub(END_BYTES as u64) else { return Ok(()) };
-        self.file.seek(SeekFrom::Start(footer))?;
-        let is_read = fill(&mut self.file, &mut end)?;
-        let mut f = Fields(&end);
-        let start = match (f.u8(), f.u64(), f.u64()) {
-            (Some(Op::FOOTER), Some(20), Some(start)) if is_read && end.ends_with(&MAGIC) && start > 0 => start,
-            _ => footer,
-        };
-        self.file.seek(SeekFrom::Start(start))?;
+        if let Some(start) = summary::find_start(&mut self.file)? {
+            self.file.seek(SeekFrom::Start(start))?;
+            self.read_declarations_of_reports()?;
+        }
+        self.file.seek(SeekFrom::Start(beginning))?;
+        self.position = beginning;
+        Ok(())
+    }
+
+    /// Finds the channels of the reports from here to the footer.
+    fn read_declarations_of_reports(&mut self) -> io::Result<()> {
         let mut schemas = Schemas::default();
         while let Some((op, length)) = self.read_head()? {
             match op {
@@ -351,8 +350,6 @@ impl Index {
                 _ => self.file.seek_relative(length as i64)?,
             }
         }
-        self.file.seek(SeekFrom::Start(beginning))?;
-        self.position = beginning;
         Ok(())
     }
 

@@ -37,8 +37,10 @@ pub struct InstrumentMessage<'a> {
     pub topic: &'a str,
     /// The schema of its topic, such as `sensor_msgs/msg/Imu`.
     pub schema: &'a str,
-    /// Seconds and nanoseconds of the header; the log time if they are 0.
-    pub time: (i64, u32),
+    /// Seconds and nanoseconds of the header; `None` if they are 0, or cannot be read.
+    pub stamp: Option<(i64, u32)>,
+    /// Seconds and nanoseconds of the log time.
+    pub log_time: (i64, u32),
     /// The frame that the header names; empty without one.
     pub frame_id: String,
     /// The measurement; `None` if the message ends too early.
@@ -64,9 +66,10 @@ pub fn read_instruments(path: impl AsRef<Path>, mut take: impl FnMut(&Instrument
             _ => return,
         };
         let (head, measured) = read.map_or((Header::default(), None), |(head, measured)| (head, Some(measured)));
-        let logged = ((message.log_time_ns / 1_000_000_000) as i64, (message.log_time_ns % 1_000_000_000) as u32);
-        let time = head.time.filter(|time| *time != (0, 0)).map_or(logged, |(s, ns)| (i64::from(s), ns));
+        let ns = message.log_time_ns;
+        let log_time = ((ns / 1_000_000_000) as i64, (ns % 1_000_000_000) as u32);
+        let stamp = head.stamp().map(|(s, ns)| (i64::from(s), ns));
         let (topic, schema) = (channel.topic.as_str(), channel.schema.as_str());
-        take(&InstrumentMessage { topic, schema, time, frame_id: head.frame_id, measured });
+        take(&InstrumentMessage { topic, schema, stamp, log_time, frame_id: head.frame_id, measured });
     })
 }

@@ -89,6 +89,8 @@ mod series_reader;
 mod stamp;
 mod status_name;
 #[cfg(feature = "recordings")]
+mod summary;
+#[cfg(feature = "recordings")]
 mod topics;
 #[cfg(feature = "recordings")]
 mod waiting;
@@ -96,13 +98,13 @@ mod waiting;
 mod writer;
 
 #[cfg(feature = "recordings")]
-pub use camera_info::CameraInfo;
+pub use camera_info::{CameraInfo, Region};
 #[cfg(feature = "recordings")]
 pub use error::Error;
 pub use floats::words_from_floats;
 pub use frame::{Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine};
 #[cfg(feature = "recordings")]
-pub use images::{ImageReader, InputImage};
+pub use images::{Clock, ImageReader, InputImage};
 #[cfg(feature = "recordings")]
 pub use index::{Index, IndexEntry};
 #[cfg(feature = "recordings")]

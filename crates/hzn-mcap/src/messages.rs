@@ -134,18 +134,24 @@ pub(crate) fn compressed_format(name: &str) -> ImageFormat {
 
 /// Reads a picture from a protobuf message with this schema.
 pub(crate) fn parse_image(schema: &str, data: &[u8]) -> Decoded {
+    // The log time counts for these messages.
+    let header = |frame_id: String| Some(Header { time: None, frame_id });
     match schema {
-        "foxglove.CompressedImage" => {
-            let m = CompressedImage::decode(data).map_err(|e| e.to_string())?;
-            let image = EncodedImage { format: compressed_format(&m.format), bytes: m.data.into() };
-            Ok((image, Header { time: None, frame_id: m.frame_id }))
-        }
-        "foxglove.RawImage" => {
-            let m = RawImage::decode(data).map_err(|e| e.to_string())?;
-            let image = raw_format(m.width, m.height, m.step, &m.encoding, false, &m.data)?;
-            Ok((image, Header { time: None, frame_id: m.frame_id }))
-        }
-        other => Err(format!("{other} is not a picture")),
+        "foxglove.CompressedImage" => match CompressedImage::decode(data) {
+            Ok(m) => {
+                let image = EncodedImage { format: compressed_format(&m.format), bytes: m.data.into() };
+                Decoded { image: Ok(image), header: header(m.frame_id) }
+            }
+            Err(e) => Decoded { image: Err(e.to_string()), header: header(String::new()) },
+        },
+        "foxglove.RawImage" => match RawImage::decode(data) {
+            Ok(m) => {
+                let image = raw_format(m.width, m.height, m.step, &m.encoding, false, &m.data);
+                Decoded { image, header: header(m.frame_id) }
+            }
+            Err(e) => Decoded { image: Err(e.to_string()), header: header(String::new()) },
+        },
+        other => Decoded::without_header(format!("{other} is not a picture")),
     }
 }
 

@@ -7,8 +7,10 @@ use std::path::PathBuf;
 
 use crate::container::{Channel, Chunk, Fields, Inflation, MAX_RECORD_BYTES, Message, Record};
 use crate::error::Error;
-use crate::images::{InputImage, decoder};
+use crate::header::Decoded;
+use crate::images::{Clock, InputImage, decoder};
 use crate::stamp::Stamp;
+use crate::summary::fill;
 
 /// The place of one picture in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,15 +50,6 @@ pub(crate) fn next_record<'a>(rest: &mut Fields<'a>, size: usize) -> Option<(u64
     Some((offset, op, rest.bytes(usize::try_from(length).ok()?)?))
 }
 
-/// Fills a buffer; `false` if the file ends before.
-pub(crate) fn fill(file: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
-    match file.read_exact(buffer) {
-        Ok(()) => Ok(true),
-        Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
-        Err(e) => Err(e),
-    }
-}
-
 /// Reads pictures of a recording in any order.
 #[derive(Debug)]
 pub struct Pictures {
@@ -66,7 +59,7 @@ pub struct Pictures {
 }
 
 impl Pictures {
-    /// Reads the picture at a place.
+    /// Reads the picture at a place. Its time is its own stamp, or the log time if it has none.
     ///
     /// # Errors
     /// The file cannot be read. A picture that cannot be decoded is no error of this function: `image` then has the
@@ -77,7 +70,7 @@ impl Pictures {
             None => read_record(&mut self.file, place.message).map_err(read)?.map(|r| r.content),
             Some(at) => read_message_in_chunk(&mut self.file, at, place.message).map_err(read)?,
         };
-        let broken = |why: &str| InputImage::new(Err(why.to_owned()), place.log_time_ns);
+        let broken = |why: &str| InputImage::new(Decoded::without_header(why), place.log_time_ns, Clock::Log);
         let Some(message) = message.as_deref().and_then(Message::parse) else {
             return Ok(broken("the recording does not contain the picture any more, or is damaged at its place"));
         };
@@ -85,7 +78,9 @@ impl Pictures {
         let Some((channel, decode)) = channel.and_then(|c| Some((c, decoder(&c.schema, &c.encoding)?))) else {
             return Ok(broken("is on a channel without pictures"));
         };
-        Ok(InputImage::new(decode(&channel.schema, message.data), place.log_time_ns))
+        let decoded = decode(&channel.schema, message.data);
+        let is_stamped = decoded.header.as_ref().is_some_and(|header| header.stamp().is_some());
+        Ok(InputImage::new(decoded, place.log_time_ns, if is_stamped { Clock::Stamps } else { Clock::Log }))
     }
 }
 

@@ -225,7 +225,7 @@ impl Reader {
             Topic::Image | Topic::RawImage if self.contents == Contents::WithoutImages => {}
             Topic::Image | Topic::RawImage => {
                 let schema = if topic == Topic::Image { "foxglove.CompressedImage" } else { "foxglove.RawImage" };
-                let (image, _) = messages::parse_image(schema, m.data).map_err(|e| broken("picture", e))?;
+                let image = messages::parse_image(schema, m.data).image.map_err(|e| broken("picture", e))?;
                 self.waiting.add_to(m, head).images.push_back(image);
             }
             Topic::Annotations => {

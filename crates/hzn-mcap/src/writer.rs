@@ -48,7 +48,8 @@ pub struct Options {
     /// Further files, attached by name.
     pub files: Vec<(String, String)>,
     /// Whether the answers are also messages of ROS 2: the axis as `geometry_msgs/msg/Vector3Stamped` on
-    /// `/hzn/axis_vector`, its covariance as `std_msgs/msg/Float64MultiArray` on `/hzn/axis_covariance`.
+    /// `/hzn/axis_vector`, its covariance as `std_msgs/msg/Float64MultiArray` on `/hzn/axis_covariance`. The answer of
+    /// a picture without a time is not there.
     pub ros: bool,
     /// Whether an existing output, or the remains of a run, may be replaced.
     pub force: bool,
@@ -220,6 +221,8 @@ impl Writer {
         // The frames of Foxglove's messages belong to the transforms that hzn writes; those of ROS are the source's.
         let ros_frame_id = frame.stamp.as_ref().and_then(|stamp| stamp.frame_id.as_deref()).unwrap_or(frame_id);
         self.last_ns = ns;
+        // A filter would take the time of the frame before for that of the answer.
+        let ros = self.ros && frame.row.time_s.is_some();
         let sequence = frame.row.index as u32;
         let failed = |e| while_writing(&self.part, e);
         if let Some(image) = &frame.image {
@@ -247,11 +250,11 @@ impl Writer {
         }
         if let Some(axis) = frame.row.axis() {
             push(Topic::Axis, &mut |b| messages::append(&messages::axis(axis, frame_id, ns), b))?;
-            if self.ros {
+            if ros {
                 push(Topic::AxisVector, &mut |b| ros::vector(axis, ros_frame_id, ns, b))?;
             }
         }
-        if let Some(covariance) = frame.row.covariance().filter(|_| self.ros) {
+        if let Some(covariance) = frame.row.covariance().filter(|_| ros) {
             push(Topic::AxisCovariance, &mut |b| ros::matrix(covariance, b))?;
         }
         if let Some(attitude) = &frame.attitude {

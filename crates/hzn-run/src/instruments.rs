@@ -52,6 +52,11 @@ pub struct Exported {
     pub frame_id: String,
     /// Messages without a fix, and messages that end too early. They are left out.
     pub left_out: u64,
+    /// Messages with a measurement and the stamp 0, whose times are not known. They are left out, unless all messages
+    /// are such ones.
+    pub without_stamp: u64,
+    /// Whether the times are those of the log, because all stamps are 0.
+    pub is_log_time: bool,
     /// The files that have no end, so that messages may be missing.
     pub cut: Vec<PathBuf>,
 }
@@ -87,7 +92,21 @@ pub fn recordings(input: &Path) -> Result<Vec<PathBuf>, Error> {
     }
 }
 
-/// Writes the messages of a topic as a table that `hzn fuse` reads.
+/// Returns whether a topic has stamps. A driver that does not fill them in leaves them all at 0.
+fn has_stamps(recordings: &[PathBuf], topic: &str) -> Result<bool, Error> {
+    let mut found = false;
+    for path in recordings {
+        let look = |message: &InstrumentMessage<'_>| found |= message.topic == topic && message.stamp.is_some();
+        read_instruments(path, look).map_err(Error::failed)?;
+        if found {
+            break;
+        }
+    }
+    Ok(found)
+}
+
+/// Writes the messages of a topic as a table that `hzn fuse` reads. All rows have times of one clock: the stamps in the
+/// headers, or the log times if all stamps are 0.
 ///
 /// # Errors
 /// A recording cannot be read, or the table cannot be written.
@@ -99,7 +118,8 @@ pub fn write_table(
 ) -> Result<Exported, Error> {
     let cannot_write = |e: std::io::Error| disk::cannot_write(table, &e);
     let mut out = BufWriter::new(Checked::create(table).map_err(cannot_write)?);
-    let mut exported = Exported { topic: topic.to_owned(), ..Exported::default() };
+    let is_log_time = !has_stamps(recordings, topic)?;
+    let mut exported = Exported { topic: topic.to_owned(), is_log_time, ..Exported::default() };
     writeln!(out, "{}", instrument.header()).map_err(cannot_write)?;
     for path in recordings {
         let mut written = Ok(());
@@ -107,15 +127,20 @@ pub fn write_table(
             if message.topic != topic || written.is_err() {
                 return;
             }
-            let Some(row) = row(instrument, message) else {
+            let Some(values) = values(instrument, message) else {
                 exported.left_out += 1;
+                return;
+            };
+            exported.without_stamp += u64::from(message.stamp.is_none());
+            let Some((s, ns)) = message.stamp.filter(|_| !is_log_time).or(is_log_time.then_some(message.log_time))
+            else {
                 return;
             };
             if exported.rows == 0 {
                 exported.frame_id.clone_from(&message.frame_id);
             }
             exported.rows += 1;
-            written = writeln!(out, "{row}");
+            written = writeln!(out, "{s}.{ns:09}{values}");
         });
         written.map_err(cannot_write)?;
         if !is_whole.map_err(Error::failed)? {
@@ -170,10 +195,9 @@ fn gnss_row(fix: &Fix) -> String {
     format!("{time_s:.6},{lat},{lon},{height_m},,")
 }
 
-/// Returns the row of a message; `None` if it has no measurement.
-fn row(instrument: Instrument, message: &InstrumentMessage<'_>) -> Option<String> {
-    let (s, ns) = message.time;
-    let mut row = format!("{s}.{ns:09}");
+/// Returns the row of a message after its time; `None` if it has no measurement.
+fn values(instrument: Instrument, message: &InstrumentMessage<'_>) -> Option<String> {
+    let mut row = String::new();
     let mut add = |value: f64| {
         row.push(',');
         // An empty cell is a value that is not known.

@@ -104,7 +104,7 @@ pub fn measure_field_of_view(request: &Request, known: &CameraFacts) -> Result<L
 
 /// Reads some pictures with an altitude, which is `known` or in frames.csv.
 fn read_pictures(request: &Request, known: &CameraFacts) -> Result<Vec<(Picture, Option<FrameData>)>, Error> {
-    let mut source = source::open(&request.inputs, None, None)?;
+    let mut source = source::open(&request.inputs, None, request.topic.as_deref())?;
     let frames = frames_path(request, source.as_ref()).map(|path| load_frames(&path, source.as_ref())).transpose()?;
     let knows = |data: &FrameData| data.position_km.is_some() || data.altitude_km.is_some();
     // The pictures of a folder are spread over it. A sequence of unknown length gives its first ones.

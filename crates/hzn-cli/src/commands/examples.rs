@@ -59,6 +59,7 @@ hzn simulate mine.toml -o mine --seed 7    the changed scene, with other random 
 hzn init flight/ --fov 92 --lens fisheye          a fisheye that sees 92 degrees over the width
 hzn init IMG_0001.JPG --altitude 418 -o iss.toml  the lens as EXIF has it, pictures from 418 km
 hzn init flight/ --altitude 418                   without EXIF: the field of view from the limb
+hzn init bag/ --topic /rear/image_raw             one camera of a bag of ROS 2
 hzn init moon/ --fov 40 --body moon --altitude 100   a camera in orbit around the Moon
 hzn init --rig left right --mount 1,0,0,0 --mount 0,0,0,1   several heads, into rig.toml",
     ),

@@ -92,7 +92,7 @@ fn choose<'a>(
 
 /// Says how many rows were written, which axes `hzn fuse` takes theirs for, and which messages were left out.
 fn report(which: Instrument, table: &Path, exported: &Exported) -> Result<(), Stop> {
-    let Exported { rows, topic, frame_id, left_out, cut } = exported;
+    let Exported { rows, topic, frame_id, left_out, without_stamp, is_log_time, cut } = exported;
     tell::line(one_line(format!("{}: {} of {topic}", table.display(), counted(*rows, "row"))));
     if which == Instrument::Imu && !frame_id.is_empty() {
         let what = "hzn fuse takes these axes for those of the vehicle";
@@ -104,6 +104,13 @@ fn report(which: Instrument, table: &Path, exported: &Exported) -> Result<(), St
             Instrument::Gnss => "have no fix, or end too early",
         };
         tell::warning(format_args!("{} of {topic} {what}, and were left out", counted(*left_out, "message")));
+    }
+    if *is_log_time && *without_stamp > 0 {
+        let what = "the stamps in the headers are all 0, so the times are those of the log, which are later";
+        tell::warning(format_args!("{topic}: {what}"));
+    } else if *without_stamp > 0 {
+        let what = "have the stamp 0 while others have a time, and were left out";
+        tell::warning(format_args!("{} of {topic} {what}", counted(*without_stamp, "message")));
     }
     for path in cut {
         tell::warning(format_args!("{}: was cut off or is damaged; what comes before was written", path.display()));

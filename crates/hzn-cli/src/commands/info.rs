@@ -140,9 +140,9 @@ fn foreign(file: &Path) -> Result<Described, Stop> {
     let mut reader = hzn_mcap::ImageReader::open(file, None).map_err(failed)?;
     let (mut count, mut span) = (0u64, None::<(f64, f64)>);
     for image in reader.by_ref() {
-        let t = image.map_err(failed)?.time_s;
+        let time_s = image.map_err(failed)?.time_s;
         count += 1;
-        span = Some(span.map_or((t, t), |(a, b)| (a.min(t), b.max(t))));
+        span = time_s.map(|t| span.map_or((t, t), |(a, b)| (a.min(t), b.max(t)))).or(span);
     }
     let mut out = Facts::new("pictures-in-mcap", "recording without results of hzn");
     let next = if count > 0 {
@@ -152,10 +152,9 @@ fn foreign(file: &Path) -> Result<Described, Stop> {
     };
     out.line("for", next.to_owned());
     out.fact("pictures", count.to_string(), "pictures", count);
-    if let (Some(topic), Some((a, b))) = (reader.topic(), span) {
-        out.fact("topic", topic.to_owned(), "topic", topic);
-        out.time(a, b);
-    }
+    reader.topic().into_iter().for_each(|topic| out.fact("topic", topic.to_owned(), "topic", topic));
+    span.into_iter().for_each(|(a, b)| out.time(a, b));
+    source::describe_clock(&reader).into_iter().for_each(|note| out.line("note", note));
     let others: Vec<&str> = reader.other_topics().collect();
     others.iter().for_each(|topic| out.line("other topic", (*topic).to_owned()));
     out.key("other_topics", json!(others));

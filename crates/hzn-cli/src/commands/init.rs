@@ -43,8 +43,11 @@ pub(super) struct Args {
     /// gives one
     #[arg(long, value_name = "KM", requires = "pictures")]
     altitude: Option<f64>,
+    /// Topic of the pictures in an MCAP; without it, the first topic with pictures
+    #[arg(long, value_name = "TOPIC", requires = "pictures")]
+    topic: Option<String>,
     /// Write a rig.toml for several cameras (heads); the pictures are a folder for each head
-    #[arg(long, requires = "pictures", conflicts_with_all = ["fov", "lens", "altitude"])]
+    #[arg(long, requires = "pictures", conflicts_with_all = ["fov", "lens", "altitude", "topic"])]
     rig: bool,
     /// With --rig: rotation from the camera to the rig as a quaternion, scalar first; once for each folder, in order
     #[arg(long, value_name = "W,X,Y,Z", requires = "rig", allow_hyphen_values = true)]
@@ -99,6 +102,10 @@ impl Args {
     fn output(&self) -> &Path {
         self.output.as_deref().unwrap_or(Path::new(if self.rig { "rig.toml" } else { "sensor.toml" }))
     }
+    /// Opens the pictures.
+    fn open(&self) -> Result<Box<dyn Source>, Stop> {
+        Ok(source::open(&self.pictures, None, self.topic.as_deref())?)
+    }
     /// Returns the mounts of the heads of a rig.
     fn mounts(&self) -> Result<Vec<init_rig::Mount>, Stop> {
         self.camchain.as_deref().map_or_else(|| Ok(self.mount.clone()), init_rig::of_camchain)
@@ -116,7 +123,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Err(usage(format!("{name}: is a file to write, not a picture; name it with -o:  hzn init -o {name}")));
     }
     let name = args.output().display();
-    let source = if args.pictures.is_empty() { None } else { Some(source::open(&args.pictures, None, None)?) };
+    let source = if args.pictures.is_empty() { None } else { Some(args.open()?) };
     let read = source.as_ref().map(|source| source.files()).unwrap_or_default();
     disk::refuse_inputs(&read, &[args.output().to_owned()])?;
     if args.output().exists() && !args.force {
@@ -252,25 +259,26 @@ fn calibrated(args: &Args, known: &CameraFacts) -> Result<Option<String>, Stop> 
     if args.fov.is_some() || args.lens.is_some() {
         return Ok(None);
     }
-    let Some(source::RecordedCamera { topic, camera }) = source::find_camera(&args.pictures)? else { return Ok(None) };
+    let found = source::find_camera(&args.pictures, args.topic.as_deref())?;
+    let Some(source::RecordedCamera { from, camera, size_fields }) = found else { return Ok(None) };
     let camera = match camera {
-        Ok(camera) if [camera.width, camera.height].map(u32::from) == known.size_px => camera,
-        Ok(camera) => {
-            let ([width, height], (w, h)) = (known.size_px, (camera.width, camera.height));
-            tell::warning(format_args!(
-                "{topic} is for {w} x {h} px and the pictures are {width} x {height}: not used. Binning and a region \
-                 of interest of such a message are not applied; hzn camera convert applies those of a YAML file"
-            ));
-            return Ok(None);
-        }
+        Ok(camera) => camera,
         Err(what) => {
-            tell::warning(format_args!("{topic} is not used: {what}"));
+            tell::warning(format_args!("{from} is not used: {what}"));
             return Ok(None);
         }
     };
-    let text = start::write_calibrated(known, &camera, &topic).map_err(usage)?;
+    let ([width, height], (w, h)) = (known.size_px, (camera.width, camera.height));
+    if [w, h].map(u32::from) != known.size_px {
+        return Err(usage(format!(
+            "{from}: {size_fields} are for pictures of {w} x {h} px, and these are {width} x {height} px: the lens \
+             does not fit. Write the message into a file (ros2 topic echo --once), correct the fields there and read \
+             it with hzn camera convert; or give --fov or --lens, with which the message is not used"
+        )));
+    }
+    let text = start::write_calibrated(known, &camera, &from).map_err(usage)?;
     tell::line(format_args!(
-        "{} written: {} x {} px, {}, f = {:.1} px, from {topic}",
+        "{} written: {} x {} px, {}, f = {:.1} px, from {from}",
         args.output().display(),
         camera.width,
         camera.height,
@@ -283,14 +291,14 @@ fn calibrated(args: &Args, known: &CameraFacts) -> Result<Option<String>, Stop> 
 /// Returns whether the sensor, or a frames.csv next to the pictures, gives altitudes.
 fn knows_altitudes(args: &Args, config: &Config) -> Result<bool, Stop> {
     let request = request(args);
-    let source = source::open(&args.pictures, None, None)?;
+    let source = args.open()?;
     let path = open::frames_path(&request, source.as_ref());
     let frames = path.map(|path| open::load_frames(&path, source.as_ref())).transpose()?;
     Ok(open::check_altitude(source.as_ref(), config, frames.as_ref()).is_ok())
 }
 
 fn request(args: &Args) -> Request {
-    Request { inputs: args.pictures.clone(), ..Request::default() }
+    Request { inputs: args.pictures.clone(), topic: args.topic.clone(), ..Request::default() }
 }
 
 /// Finds the field of view from the limb, if an altitude is known.

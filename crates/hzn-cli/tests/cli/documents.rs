@@ -17,6 +17,7 @@ const ONLY_PARSED: &[(&str, &str)] = &[
     ("hzn calibrate", "needs targets or a long flight; calibrate*.rs run it"),
     ("hzn fuse", "needs a long flight; fuse.rs runs it"),
     ("hzn info bag", "needs the bag of a ROS system; tests of hzn-mcap read its messages"),
+    ("hzn init bag", "needs the same"),
     ("hzn run bag", "needs the same"),
     ("hzn init flight.mp4", "needs a video; gopro.rs runs it"),
     ("hzn run flight.mp4", "needs the same"),

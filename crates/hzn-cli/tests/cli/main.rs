@@ -3,6 +3,8 @@
 mod advice;
 mod arrays;
 mod bad_input;
+mod bag_cameras;
+mod bag_clocks;
 mod bags;
 mod bodies;
 mod calibrate;

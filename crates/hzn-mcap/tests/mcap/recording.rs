@@ -238,7 +238,7 @@ fn our_recordings_are_an_input_too() {
         let got: Vec<_> = images.by_ref().map(Result::unwrap).collect();
         assert_eq!((got.len(), images.broken()), (n, None));
         for (a, (time_s, image)) in got.iter().zip(&expect) {
-            assert!((a.time_s - time_s.unwrap()).abs() < 1e-6);
+            assert!((a.time_s.unwrap() - time_s.unwrap()).abs() < 1e-6);
             assert_eq!(a.image.as_ref(), Ok(image));
         }
     };
@@ -298,7 +298,7 @@ fn any_picture_is_found_by_its_place() {
         let expect = frame(place.sequence().into());
         let image = reader.read(place).unwrap();
         assert_eq!(image.image.ok(), expect.image);
-        assert!((image.time_s - expect.row.time_s.unwrap()).abs() < 1e-6);
+        assert!((image.time_s.unwrap() - expect.row.time_s.unwrap()).abs() < 1e-6);
     }
     let with_picture = (0..11).filter(|&i| frame(i).image.is_some()).count();
     assert_eq!(pictures.len(), with_picture);

@@ -81,7 +81,9 @@ impl Bag {
         let mut topic = topic.map(str::to_owned);
         let mut first_error = None;
         for path in &files {
-            match Recording::open(path, topic.as_deref()) {
+            // All pictures have the times of one clock.
+            let clock = bag.recordings.first().and_then(Recording::clock);
+            match Recording::open(path, topic.as_deref(), clock) {
                 Ok(recording) => {
                     topic = topic.or_else(|| recording.topic().map(str::to_owned));
                     bag.recordings.push(recording);

@@ -62,6 +62,8 @@ pub use payload::Payload;
 pub use picture::Picture;
 pub use raw::Raw;
 #[cfg(feature = "recordings")]
+pub use recording::describe_clock;
+#[cfg(feature = "recordings")]
 pub use rerun::{describe_loss as describe_recording_loss, describe_rest, describe_unread, recorded_prior};
 pub use sequence::Source;
 pub use tone::FoundTone;
@@ -153,7 +155,7 @@ fn open_recording(path: &Path, topic: Option<&str>) -> Result<Box<dyn Source>, E
     {
         return Ok(Box::new(ours));
     }
-    Ok(Box::new(recording::Recording::open(path, topic)?))
+    Ok(Box::new(recording::Recording::open(path, topic, None)?))
 }
 
 /// Returns the EXIF time of exposure of a picture file, in seconds since 1970.

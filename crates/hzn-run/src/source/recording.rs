@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hzn_mcap::{EncodedImage, ImageFormat, ImageReader};
+use hzn_mcap::{Clock, EncodedImage, ImageFormat, ImageReader};
 
 use super::header;
 use super::item::{Item, TimeSource};
@@ -25,8 +25,9 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    pub(super) fn open(path: &Path, topic: Option<&str>) -> Result<Self, Error> {
-        let reader = ImageReader::open(path, topic).map_err(unusable)?;
+    /// Opens a recording; `clock` is that of the recordings before it in its bag.
+    pub(super) fn open(path: &Path, topic: Option<&str>, clock: Option<Clock>) -> Result<Self, Error> {
+        let reader = ImageReader::open(path, topic).map_err(unusable)?.with_clock(clock);
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let mut recording = Self { reader, path: path.to_owned(), name, first: None, index: 0 };
         recording.first = match recording.read() {
@@ -57,6 +58,16 @@ impl Recording {
         self.reader.topic()
     }
 
+    /// Returns the clock of the pictures.
+    pub(super) fn clock(&self) -> Option<Clock> {
+        self.reader.clock()
+    }
+
+    /// Returns a reader of the same pictures from their beginning.
+    fn again(&self) -> Option<ImageReader> {
+        Some(ImageReader::open(&self.path, self.topic()).ok()?.with_clock(self.clock()))
+    }
+
     fn frame_name(&self, index: u64) -> String {
         format!("{}#{index:06}", self.name)
     }
@@ -72,7 +83,7 @@ impl Recording {
             Ok(image) => Payload::from_recorded(image),
             Err(why) => Payload::Broken(why),
         };
-        let time = TimeSource::Container(Some(image.time_s));
+        let time = TimeSource::Container(image.time_s);
         Some(Ok(Item { name, time, stamp: image.stamp, data: None, payload }))
     }
 }
@@ -102,9 +113,7 @@ impl Source for Recording {
         None
     }
     fn sizes(&self) -> Box<dyn Iterator<Item = (String, (u32, u32))> + '_> {
-        let Ok(reader) = ImageReader::open(&self.path, self.reader.topic()) else {
-            return Box::new(std::iter::empty());
-        };
+        let Some(reader) = self.again() else { return Box::new(std::iter::empty()) };
         let images = reader.map_while(Result::ok).take(MAX_SIZES_READ);
         Box::new(images.enumerate().filter_map(|(i, m)| Some((self.frame_name(i as u64), known_size(&m.image.ok()?)?))))
     }
@@ -115,9 +124,7 @@ impl Source for Recording {
         vec![self.path.clone()]
     }
     fn samples(&self) -> Box<dyn Iterator<Item = Payload> + '_> {
-        let Ok(reader) = ImageReader::open(&self.path, self.reader.topic()) else {
-            return Box::new(std::iter::empty());
-        };
+        let Some(reader) = self.again() else { return Box::new(std::iter::empty()) };
         let images = reader.map_while(Result::ok).step_by(SAMPLE_EVERY);
         Box::new(images.map(|m| m.image.map_or_else(Payload::Broken, Payload::from_recorded)))
     }
@@ -127,6 +134,17 @@ impl Source for Recording {
     }
     fn notes(&self) -> Vec<String> {
         let topics: Vec<&str> = self.reader.other_topics().collect();
-        if topics.is_empty() { Vec::new() } else { vec![format!("other topics with pictures: {}", topics.join(", "))] }
+        let others = (!topics.is_empty()).then(|| format!("other topics with pictures: {}", topics.join(", ")));
+        others.into_iter().chain(describe_clock(&self.reader)).collect()
     }
+}
+
+/// Says that the stamps of the pictures are 0, so that their times are those of the log.
+pub fn describe_clock(reader: &ImageReader) -> Option<String> {
+    let topic = reader.topic().filter(|_| reader.clock() == Some(Clock::LogInsteadOfZeros))?;
+    Some(format!(
+        "the stamps in the headers of {topic} are 0, so the times are those of the log: each is later than the \
+         exposure by the time that the picture took to the recorder. Let the driver of the camera fill in the stamps, \
+         or give a frames.csv with time_s"
+    ))
 }

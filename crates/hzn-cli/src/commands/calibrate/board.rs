@@ -43,6 +43,9 @@ pub(super) struct Args {
     /// Size and format of headerless pictures, as in `hzn run`
     #[arg(long, value_name = "WIDTHxHEIGHT:FORMAT")]
     raw: Option<Raw>,
+    /// Topic of the pictures in an MCAP; without it, the first topic with pictures
+    #[arg(long, value_name = "TOPIC")]
+    topic: Option<String>,
     /// Also write the camera (.toml), a report with plots (.html) or the residuals (.csv); may be given several times
     #[arg(short, long, value_name = "FILE")]
     output: Vec<PathBuf>,
@@ -63,7 +66,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Err(usage("--square-mm: must be above 0"));
     }
     let board = Board { columns: args.board.0[0], rows: args.board.0[1], square_mm: args.square_mm };
-    let mut source = source::open(&args.input, args.raw, None)?;
+    let mut source = source::open(&args.input, args.raw, args.topic.as_deref())?;
     files::check_outputs(&source.files(), &args.output, args.force)?;
     if !args.quiet {
         source.notes().iter().for_each(|note| tell::line(format_args!("note: {note}")));

@@ -2,6 +2,8 @@
 #![allow(dead_code, reason = "each test file takes what it needs")]
 #![allow(unreachable_pub, reason = "shared between test files")]
 
+pub mod ros;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
