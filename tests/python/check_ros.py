@@ -23,7 +23,7 @@ import numpy as np
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer as Mcap
 from mcap.reader import make_reader
-from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from rosbags.rosbag2 import Reader, ReaderError, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 W, H, F = 320, 240, 300.0
@@ -212,14 +212,41 @@ def check_flight(folder, store):
             with contextlib.redirect_stdout(io.StringIO()) as out:
                 exec(compile(program, str(BOOK), "exec"), {})
             printed.append(out.getvalue())
-    # The first and the last print a line for each picture; the other one writes a bag.
-    need([len(text.splitlines()) for text in printed] == [12, 0, 12], f"lines of the programs: {printed}")
+    # The first and the last print a line for each picture; the others write a copy and a bag.
+    need([len(text.splitlines()) for text in printed] == [12, 0, 0, 12], f"lines of the programs: {printed}")
+    check_profile(folder, store, vectors)
     rows = {round(float(r["time_s"]) * 1e9): axis(r) for r in csv.DictReader(open(folder / "flight.csv", newline=""))}
     with Reader(folder / "nadir") as bag:
         read = {at: store.deserialize_cdr(data, topic.msgtype).vector for topic, at, data in bag.messages()}
     need(read.keys() == rows.keys(), f"times of the bag: {sorted(read)}")
     for at, vector in read.items():
         need(np.array_equal([vector.x, vector.y, vector.z], rows[at]), "axis in the bag of the book")
+
+
+def check_profile(folder, store, vectors):
+    """Compares the profiles with what MCAP's registry asks of them, and reads the copy of the book with rosbags."""
+    kinds = {}
+    for name in ("ros.mcap", "axes.mcap"):
+        with open(folder / name, "rb") as file:
+            reader = make_reader(file)
+            summary = reader.get_summary()
+            kinds[name] = reader.get_header().profile, {
+                (channel.message_encoding, summary.schemas[channel.schema_id].encoding)
+                for channel in summary.channels.values()
+            }
+    mixed = {("cdr", "ros2msg"), ("json", "jsonschema"), ("protobuf", "protobuf")}
+    need(kinds == {"ros.mcap": ("", mixed), "axes.mcap": ("ros2", {("cdr", "ros2msg")})}, f"profiles: {kinds}")
+    try:
+        Reader(folder / "ros.mcap").open()
+        need(False, "rosbags reads a recording without a profile: the book says that it does not")
+    except ReaderError as error:
+        need("rofile is not ros2" in str(error), f"rosbags: {error}")
+    with Reader(folder / "axes.mcap") as bag:
+        read = [(topic.topic, at, store.deserialize_cdr(data, topic.msgtype)) for topic, at, data in bag.messages()]
+    axes = {at: message.vector for topic, at, message in read if topic == "/hzn/axis_vector"}
+    need(len(read) == 2 * len(vectors) and axes.keys() == vectors.keys(), f"messages of the copy: {len(read)}")
+    for at, vector in axes.items():
+        need(np.array_equal([vector.x, vector.y, vector.z], vectors[at]), "axis in the copy of the book")
 
 
 def check_compressed(folder):
