@@ -5,7 +5,8 @@ usage: check_ros.py HZN FOLDER
 
 The script makes FOLDER. `rosbags` writes a bag with the limb of a planet in each encoding of sensor_msgs/Image, and a
 bag in SQLite; `mcap-ros2-support` writes a recording of sensor_msgs/CompressedImage. Each picture must have the answer of
-the grey picture. Both libraries then read what `hzn run --ros` has written. Exits with 1 at the first difference.
+the grey picture. Both libraries then read what `hzn run --ros` has written. `hzn init` takes the calibration of one of two
+cameras. Exits with 1 at the first difference.
 """
 
 import contextlib
@@ -16,6 +17,7 @@ import re
 import struct
 import subprocess
 import sys
+import tomllib
 import zlib
 from pathlib import Path
 
@@ -44,7 +46,7 @@ limb = "height"
 [gates]
 fixed_edge = "off"
 """
-IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+IMAGE, COMPRESSED, INFO = (f"sensor_msgs/msg/{name}" for name in ("Image", "CompressedImage", "CameraInfo"))
 # The centre of the body of `limb()`.
 TRUTH = np.array([0.0, math.sin(math.radians(68.0)), math.cos(math.radians(68.0))])
 BOOK = Path(__file__).parents[2] / "book/guide/ros.md"
@@ -266,6 +268,35 @@ def check_compressed(folder):
     need([(r["status"], r["time_s"]) for r in rows] == [("ok", "5.25"), ("ok", "6.25")], f"compressed: {rows}")
 
 
+def check_cameras(folder, store):
+    """Starts a sensor for one of two cameras, whose CameraInfo has binning and a window, as rosbags encodes it."""
+    header, time, image, info, roi = (store.types[n] for n in (
+        "std_msgs/msg/Header", "builtin_interfaces/msg/Time", IMAGE, INFO, "sensor_msgs/msg/RegionOfInterest"))
+    # The window begins in column 40 and row 20, and two by two pixels become one.
+    k = np.array([2 * F, 0, 2 * 159.5 + 40, 0, 2 * F + 1, 2 * 119.5 + 20, 0, 0, 1])
+    window = roi(x_offset=40, y_offset=20, height=2 * H, width=2 * W, do_rectify=False)
+    with Writer(folder / "cameras", version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        for name, scale in (("front", 3.0), ("rear", 1.0)):
+            head = header(stamp=time(sec=5, nanosec=0), frame_id=name)
+            lens = info(header=head, height=2 * H + 60, width=2 * W + 80, distortion_model="plumb_bob",
+                        d=np.array([-0.1, 0.01, 0, 0, 0]), k=k * np.array([scale, 1, 1, 1, scale, 1, 1, 1, 1]),
+                        r=np.eye(3).ravel(), p=np.zeros(12), binning_x=2, binning_y=2, roi=window)
+            picture = image(header=head, height=H, width=W, encoding="mono8", is_bigendian=0, step=W,
+                            data=np.rint(limb()).astype(np.uint8).ravel())
+            for topic, message, kind in (("camera_info", lens, INFO), ("image_raw", picture, IMAGE)):
+                connection = bag.add_connection(f"/{name}/{topic}", kind, typestore=store)
+                bag.write(connection, 7 * 10**9, store.serialize_cdr(message, kind))
+    sensor = folder / "rear.toml"
+    said = hzn("init", folder / "cameras", "--topic", "/rear/image_raw", "--altitude", 400, "-o", sensor)
+    need("/rear/camera_info" in said.stderr + said.stdout and "/front/image_raw" in said.stderr, said.stderr)
+    camera = tomllib.loads(sensor.read_text())["camera"]
+    expected = {"width": W, "height": H, "fx_px": F, "fy_px": F + 0.5, "cx_px": 159.5, "cy_px": 119.5}
+    need({name: camera[name] for name in expected} == expected, f"camera: {camera}")
+    need(camera["k"][:2] == [-0.1, 0.01], f"camera: {camera}")
+    said = hzn("init", folder / "cameras", "--topic", "/left", "-o", folder / "left.toml", code=2).stderr
+    need("there are some on /front/image_raw, /rear/image_raw" in said, said)
+
+
 def check_refused(folder, store):
     write_bag(folder / "sqlite", store, StoragePlugin.SQLITE3, list(encodings(limb()))[:1])
     for path in [folder / "sqlite", next((folder / "sqlite").glob("*.db3"))]:
@@ -288,6 +319,7 @@ def main():
     check_bytes_of_rosbags(answers, store, rows)
     check_flight(folder, store)
     check_compressed(folder)
+    check_cameras(folder, store)
     check_refused(folder, store)
     print(f"check_ros: {len(rows)} encodings, 2 compressed pictures, and the answers as messages of ROS are right")
 
