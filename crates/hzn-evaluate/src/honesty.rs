@@ -10,8 +10,8 @@ pub struct Honesty {
     pub answers: usize,
     /// Mean NEES. 2 is ideal; with a larger mean the covariances are too small, with a smaller mean too large.
     pub nees: f64,
-    /// Number of independent answers that would say as much about the covariance. Answers of one flight whose errors are
-    /// mostly common say little more than one of them.
+    /// Number of independent answers that would say as much about the covariance. Answers of one flight whose errors
+    /// are mostly common say little more than one of them.
     pub independent: f64,
     /// Interval that holds 95 % of the means if the covariances and their common parts are right.
     pub interval: [f64; 2],
@@ -33,11 +33,11 @@ pub struct Within {
 }
 
 impl Honesty {
-    /// Summarises NEES values; returns `None` if there are none. `common` is the mean square of the share of the variance
-    /// that is common to all answers; 0 if they are independent.
+    /// Summarises NEES values; returns `None` if there are none. `common` is the mean square of the share of the
+    /// variance that is common to all answers; 0 if they are independent.
     ///
-    /// Two errors of which the share ρ of the variance is the same have NEES with the covariance 4ρ², and one NEES has the
-    /// variance 4. So the mean of n has the variance of n/(1 + (n − 1)ρ²) independent ones.
+    /// Two errors of which the share ρ of the variance is the same have NEES with the covariance 4ρ², and one NEES has
+    /// the variance 4. So the mean of n has the variance of n/(1 + (n − 1)ρ²) independent ones.
     pub fn from_nees(nees: &[f64], common: f64) -> Option<Self> {
         let n = nees.len();
         if n == 0 {

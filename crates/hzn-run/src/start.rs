@@ -199,8 +199,8 @@ pub fn find_doubt(
     let text = format!(
         "the limb in {kept} of {seen} pictures contradicts the field of view or the altitude. If the altitude is \
          right, the pictures are {}, not {:.1} degrees{}. Check both, and the kind of lens (the field of view of a \
-         fisheye is not 2 atan(width / 2f)); without --fov, that of the limb is taken. The sigma of the focal length is \
-         larger for that, so that answers with it are possible, but less accurate",
+         fisheye is not 2 atan(width / 2f)); without --fov, that of the limb is taken. The sigma of the focal length \
+         is larger for that, so that answers with it are possible, but less accurate",
         limb.describe(known.size_px[0]),
         start.fov_deg,
         altitude.unwrap_or_default()

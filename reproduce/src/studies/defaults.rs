@@ -84,8 +84,8 @@ impl Rendered {
         if self.rates { sensor } else { sensor.without_rates() }
     }
 
-    /// Returns the configuration of a user who knows the camera and its mask: every other key is the default. The program
-    /// finds the tone from the files.
+    /// Returns the configuration of a user who knows the camera and its mask: every other key is the default. The
+    /// program finds the tone from the files.
     pub(super) fn default_sensor(&self) -> Config {
         let camera = self.flight.sensor.camera.clone();
         let mut sensor = Config { mask: self.flight.sensor.mask.clone(), ..Config::new(camera) };

@@ -46,7 +46,8 @@ impl Rendered {
         Ok(Self { flight, pictures, limb_km })
     }
 
-    /// Returns a sensor that knows this lens; every other key is the default. The program finds the tone from the files.
+    /// Returns a sensor that knows this lens; every other key is the default. The program finds the tone from the
+    /// files.
     fn sensor(&self, lens: camera::Config) -> Config {
         let mut sensor = Config { mask: self.flight.sensor.mask.clone(), ..Config::new(lens) };
         sensor.input.tone = self.flight.sensor.input.tone;

@@ -144,26 +144,41 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(found) = &found {
         (known.lens, known.measured) = (Some(found.lens), Some(found.measured));
     }
-    let mut start = start::write_sensor_toml(&known).map_err(usage)?;
-    // What the file says is checked before it is written: a refused file helps nobody.
-    let parsed = hzn_files::sensor::parse(&start.text, args.output())?;
-    let is_stated = known.has_focal();
-    let doubt = if is_stated { find_doubt(&request(args), &known, &start, &parsed.config)? } else { None };
-    if let Some(doubt) = &doubt {
-        known.doubt_percent = Some(doubt.focal_percent);
-        start = start::write_sensor_toml(&known).map_err(usage)?;
-        hzn_files::sensor::parse(&start.text, args.output())?;
-    }
+    let (start, doubt) = checked_start(args, &mut known)?;
     write(&start.text)?;
     start.warnings.iter().for_each(tell::warning);
     tell_turn(&known);
-    doubt.iter().for_each(|doubt| tell::warning(&doubt.text));
+    doubt.iter().for_each(tell::warning);
     if let Some(found) = &found {
         let [kept, seen] = found.pictures;
         tell::line(format_args!("the limb in {kept} of {seen} pictures says: {}", found.describe(known.size_px[0])));
     }
+    tell_start(args, &known, &start);
+    tell_radians(args);
+    tell_circle(&start);
+    tell_width(args, &known, start.lens);
+    finish(args, &start.text, &known)
+}
+
+/// Returns the file to start from, and what the limb contradicts of it. A contradiction makes its sigma larger.
+fn checked_start(args: &Args, known: &mut CameraFacts) -> Result<(StartConfig, Option<String>), Stop> {
+    let write = |known: &CameraFacts| -> Result<_, Stop> {
+        let start = start::write_sensor_toml(known).map_err(usage)?;
+        // What the file says is checked before it is written: a refused file helps nobody.
+        let parsed = hzn_files::sensor::parse(&start.text, args.output())?;
+        Ok((start, parsed.config))
+    };
+    let (start, config) = write(known)?;
+    let doubt = if known.has_focal() { find_doubt(&request(args), known, &start, &config)? } else { None };
+    let Some(doubt) = doubt else { return Ok((start, None)) };
+    known.doubt_percent = Some(doubt.focal_percent);
+    Ok((write(known)?.0, Some(doubt.text)))
+}
+
+fn tell_start(args: &Args, known: &CameraFacts, start: &StartConfig) {
     tell::line(format_args!(
-        "{name} written: {} x {} px, {}, {:.1} degrees wide, f = {:.0} px +- {:.1} %, k1 = 0 +- {:.2}",
+        "{} written: {} x {} px, {}, {:.1} degrees wide, f = {:.0} px +- {:.1} %, k1 = 0 +- {:.2}",
+        args.output().display(),
         known.size_px[0],
         known.size_px[1],
         start.lens.name(),
@@ -172,10 +187,6 @@ pub(super) fn run(args: &Args) -> Outcome {
         start.focal_sigma_percent,
         start.k1_sigma,
     ));
-    tell_radians(args);
-    tell_circle(&start);
-    tell_width(args, &known, start.lens);
-    finish(args, &start.text, &known)
 }
 
 /// Asks for the unit of a narrow field of view that would be that of a usual camera in radians.

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 /// If at least this many bits of all samples are unused, this is not by chance.
 const UNUSED_BITS: u32 = 2;
-/// Bits that chance leaves at 0 in so many samples once in a million pictures: of n different samples, the lowest k bits
-/// are all 0 with a probability of 2^(−k·n).
+/// Bits that chance leaves at 0 in so many samples once in a million pictures: of n different samples, the lowest k
+/// bits are all 0 with a probability of 2^(−k·n).
 const CERTAIN_BITS: usize = 20;
 
 /// The levels of samples of 16 bits.
@@ -52,8 +52,8 @@ impl Levels {
 pub(super) fn of_upper_bits(bits: u8) -> String {
     let step = 1u32 << (16 - bits.min(16));
     format!(
-        "all samples are multiples of {step}: if the camera writes its {bits} bits into the upper bits of the words, set \
-         bits = 16"
+        "all samples are multiples of {step}: if the camera writes its {bits} bits into the upper bits of the words, \
+         set bits = 16"
     )
 }
 
@@ -81,8 +81,8 @@ impl FromIterator<u16> for Levels {
 mod tests {
     use super::*;
 
-    /// A dark picture of a camera with 12 bits: in the lower bits of the words, in the upper ones, and of two levels only,
-    /// which say nothing.
+    /// A dark picture of a camera with 12 bits: in the lower bits of the words, in the upper ones, and of two levels
+    /// only, which say nothing.
     #[test]
     fn shifted_bits_are_told_from_unused_ones() {
         let dark = (0..500).map(|i| i * 7 % 500);

@@ -103,8 +103,8 @@ impl Payload {
         }
     }
 
-    /// Returns the levels of a picture of 16-bit words; of one that states its white value, only that. Returns `None` for
-    /// any other or unreadable picture.
+    /// Returns the levels of a picture of 16-bit words; of one that states its white value, only that. Returns `None`
+    /// for any other or unreadable picture.
     pub(super) fn levels(self, sensor: &Config) -> Option<Levels> {
         let white = || Some([u16::MAX].into_iter().collect());
         match &self {
