@@ -56,7 +56,7 @@ pub(crate) fn make(py: Python<'_>, said: &Said<'_>) -> PyResult<Config> {
         let doubt = errors::detached(py, || find_doubt(&request, &known, &start, &parsed.config))?;
         if let Some(doubt) = doubt.map_err(errors::image)? {
             errors::warn(py, in_python(&doubt.text))?;
-            known.doubt_percent = Some(doubt.focal_percent);
+            known.doubt_percent = doubt.focal_percent;
             (start, parsed) = write(&known)?;
         }
     }

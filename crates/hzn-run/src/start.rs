@@ -171,8 +171,9 @@ pub struct Doubt {
     /// What contradicts what, with the values that would fit, in words.
     pub text: String,
     /// 1-sigma in percent that is to be added to that of the focal length: with it, the difference is just not worth a
-    /// warning.
-    pub focal_percent: f64,
+    /// warning. `None` if one altitude was told for all pictures: it may as well be the wrong value, and with a larger
+    /// sigma of the lens it would have more weight.
+    pub focal_percent: Option<f64>,
 }
 
 /// Finds out whether the limb contradicts the field of view (that was told, or that of the EXIF) or the altitude, and
@@ -196,11 +197,17 @@ pub fn find_doubt(
              not {given_km:.0} km"
         )
     });
+    let focal_percent = known.altitude_km.is_none().then_some(focal_percent);
+    let consequence = match focal_percent {
+        Some(_) => {
+            ". The sigma of the focal length is larger for that, so that answers are possible, but less accurate"
+        }
+        None => "",
+    };
     let text = format!(
         "the limb in {kept} of {seen} pictures contradicts the field of view or the altitude. If the altitude is \
          right, the pictures are {}, not {:.1} degrees{}. Check both, and the kind of lens (the field of view of a \
-         fisheye is not 2 atan(width / 2f)); without --fov, that of the limb is taken. The sigma of the focal length \
-         is larger for that, so that answers with it are possible, but less accurate",
+         fisheye is not 2 atan(width / 2f)); without --fov, that of the limb is taken{consequence}",
         limb.describe(known.size_px[0]),
         start.fov_deg,
         altitude.unwrap_or_default()

@@ -171,7 +171,7 @@ fn checked_start(args: &Args, known: &mut CameraFacts) -> Result<(StartConfig, O
     let (start, config) = write(known)?;
     let doubt = if known.has_focal() { find_doubt(&request(args), known, &start, &config)? } else { None };
     let Some(doubt) = doubt else { return Ok((start, None)) };
-    known.doubt_percent = Some(doubt.focal_percent);
+    known.doubt_percent = doubt.focal_percent;
     Ok((write(known)?.0, Some(doubt.text)))
 }
 
