@@ -123,11 +123,11 @@ pub fn legend(drawing: &Annotations) -> Vec<Entry> {
     entries.into_iter().filter(|(there, _)| *there).map(|(_, entry)| entry).collect()
 }
 
-/// A line of the limb is at least twice as wide. The points beside it are then seen to lie beside it.
+/// Half of the smallest width of the line of the limb, in pixels: points at a smaller distance lie on the line.
 const SEEN_PX: f64 = 2.5;
 
 /// Returns the name of the line of the limb. It is drawn where the answer has it, and the answer also weighs the
-/// altitude and the errors of the lens: the points can lie beside it.
+/// altitude and the errors of the lens. Therefore it can miss the points.
 fn limb_in_words(drawing: &Annotations) -> String {
     match distance_px(drawing) {
         Some(px) if px > SEEN_PX => format!("limb of the answer, {px:.0} px from its points"),

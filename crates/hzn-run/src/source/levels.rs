@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 /// If at least this many bits of all samples are unused, this is not by chance.
 const UNUSED_BITS: u32 = 2;
-/// Bits that chance leaves at 0 in so many samples once in a million pictures: of n different samples, the lowest k
-/// bits are all 0 with a probability of 2^(−k·n).
+/// So many bits are all 0 by chance in one of a million pictures: the lowest k bits of n different samples are all 0
+/// with a probability of 2^(−k·n).
 const CERTAIN_BITS: usize = 20;
 
 /// The levels of samples of 16 bits.
