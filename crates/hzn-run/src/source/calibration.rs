@@ -16,7 +16,7 @@ const PICTURES: usize = 16;
 /// A calibration in a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedCamera {
-    /// Its topic, and what of the message the lens comes from if the pictures are rectified.
+    /// Its topic. For rectified pictures it also names the field of the message that the lens comes from.
     pub from: String,
     /// The lens and the size of the pictures that it makes, after binning and the region of interest; or why they
     /// cannot be used.

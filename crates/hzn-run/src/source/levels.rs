@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 /// If at least this many bits of all samples are unused, this is not by chance.
 const UNUSED_BITS: u32 = 2;
-/// So many bits are all 0 by chance in one of a million pictures: the lowest k bits of n different samples are all 0
-/// with a probability of 2^(−k·n).
+/// So many bits are not 0 by chance: the lowest k bits of n different samples are all 0 with a probability of 2^(−k·n),
+/// which is one in a million here.
 const CERTAIN_BITS: usize = 20;
 
 /// The levels of samples of 16 bits.
