@@ -101,7 +101,7 @@ mod writer;
 pub use camera_info::{CameraInfo, Region};
 #[cfg(feature = "recordings")]
 pub use error::Error;
-pub use floats::words_from_floats;
+pub use floats::{doubt_scale, words_from_floats};
 pub use frame::{Annotations, Attitude, CandidateEdge, EncodedImage, FrameRecord, ImageFormat, LogLevel, LogLine};
 #[cfg(feature = "recordings")]
 pub use images::{Clock, ImageReader, InputImage};

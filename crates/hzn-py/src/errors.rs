@@ -35,6 +35,14 @@ pub(crate) fn other(what: impl std::fmt::Display) -> PyErr {
     HznError::new_err(terminal::lines(what))
 }
 
+/// Returns the exception for the reason why a run cannot begin or ends early.
+pub(crate) fn run(error: hzn_run::Error) -> PyErr {
+    match error.kind() {
+        hzn_run::Kind::Unusable => config(error),
+        hzn_run::Kind::Failed => other(error),
+    }
+}
+
 /// Issues a warning: work goes on, but the user should check something.
 pub(crate) fn warn(py: Python<'_>, what: impl std::fmt::Display) -> PyResult<()> {
     let text = CString::new(terminal::lines(what)).unwrap_or_default();

@@ -2,7 +2,7 @@
 
 use hzn_core::config::Input;
 use hzn_core::image::{Channel, ImageView, Layout, Pixels};
-use hzn_mcap::words_from_floats;
+use hzn_mcap::{doubt_scale, words_from_floats};
 use hzn_run::source::{Levels, picture};
 use numpy::ndarray::{Array3, ArrayD, ArrayView3, ArrayViewD, Axis, Ix2, Ix3};
 use numpy::{
@@ -111,12 +111,16 @@ impl<'py> Array<'py> {
         given.or(input.bits.filter(|_| matches!(self, Self::Words(_))))
     }
 
-    /// Returns advice for a picture without an answer: the upper bits of uint16 are unused, but no number of bits is
-    /// given.
-    pub(crate) fn unused_bits(&self, bits: Option<u8>) -> Option<String> {
+    /// Returns advice for a picture without an answer: the number of bits is not given, or does not fit the samples, or
+    /// few numbers set the scale of floats.
+    pub(crate) fn doubt_samples(&self, bits: Option<u8>) -> Option<String> {
         match self {
-            Self::Words(a) if bits.is_none() => a.as_array().iter().copied().collect::<Levels>().advice(),
-            _ => None,
+            Self::Words(a) => {
+                let levels: Levels = a.as_array().iter().copied().collect();
+                bits.map_or_else(|| levels.advice(), |bits| levels.exceed(bits))
+            }
+            Self::Floats(a) => doubt_scale(a.as_array().as_slice()?),
+            Self::Bytes(_) => None,
         }
     }
 

@@ -25,6 +25,7 @@ mod mask;
 mod nav;
 mod notebook;
 mod numbered;
+mod numbers;
 mod overlay;
 mod parameters;
 mod pickled;

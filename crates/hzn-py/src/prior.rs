@@ -4,6 +4,7 @@ use hzn_files::FrameData;
 use pyo3::prelude::*;
 
 use crate::errors;
+use crate::numbers::Numbers;
 
 /// The values that are given with a picture, from Python's arguments. A table of pandas has NaN for a gap. NaN, or an
 /// array of NaN, is therefore an unknown value, like an empty cell of a frames.csv.
@@ -20,14 +21,14 @@ impl Prior {
                         time_s = None, camera_temperature_c = None))]
     pub(crate) fn new(
         altitude_km: Option<f64>,
-        position_km: Option<[f64; 3]>,
-        attitude: Option<[f64; 4]>,
+        position_km: Option<Numbers<3>>,
+        attitude: Option<Numbers<4>>,
         attitude_sigma_deg: Option<f64>,
-        rate_rad_s: Option<[f64; 3]>,
+        rate_rad_s: Option<Numbers<3>>,
         range_km: Option<f64>,
         range_sigma_km: Option<f64>,
-        pole: Option<[f64; 3]>,
-        sun: Option<[f64; 3]>,
+        pole: Option<Numbers<3>>,
+        sun: Option<Numbers<3>>,
         time_s: Option<f64>,
         camera_temperature_c: Option<f64>,
     ) -> PyResult<Self> {
@@ -70,8 +71,8 @@ fn number(x: Option<f64>) -> Option<f64> {
     x.filter(|x| !x.is_nan())
 }
 
-fn numbers<const N: usize>(x: Option<[f64; N]>) -> Option<[f64; N]> {
-    x.filter(|x| !x.iter().all(|x| x.is_nan()))
+fn numbers<const N: usize>(x: Option<Numbers<N>>) -> Option<[f64; N]> {
+    x.map(|Numbers(x)| x).filter(|x| !x.iter().all(|x| x.is_nan()))
 }
 
 /// Checks a direction in the camera frame.

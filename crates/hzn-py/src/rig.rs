@@ -15,6 +15,7 @@ use pyo3::types::PyDict;
 
 use crate::errors;
 use crate::numbered::number;
+use crate::numbers::Numbers;
 use crate::prior::{Prior, utc};
 use crate::read::Read;
 use crate::report::Report;
@@ -26,7 +27,10 @@ use crate::state::State;
 pub(crate) struct Rig {
     sensors: Vec<Py<Sensor>>,
     names: Vec<String>,
+    file: rig::Rig,
     joiner: Arc<Joiner>,
+    /// The joiners for the sensors of picture files that have bits or a tone of their own.
+    completed: Mutex<Vec<(Completed, Arc<Joiner>)>>,
 }
 
 #[pymethods]
@@ -37,7 +41,7 @@ impl Rig {
                         misleading = None))]
     fn new(
         sensors: Vec<Py<Sensor>>,
-        mounts: Vec<[f64; 4]>,
+        mounts: Vec<Numbers<4>>,
         names: Option<Vec<String>>,
         limb_groups: Option<Vec<Option<String>>>,
         mount_sigma_deg: f64,
@@ -66,18 +70,19 @@ impl Rig {
             ..default
         };
         common.mount.sigma_deg = rig_sigma_deg;
-        let head = |((name, q_rig_from_camera_wxyz), limb_group): ((&String, [f64; 4]), Option<String>)| Head {
-            name: name.clone(),
-            sensor: None,
-            pictures: name.into(),
-            mount: Some(HeadMount { q_rig_from_camera_wxyz, sigma_deg: mount_sigma_deg, covariance_deg2: None }),
-            limb_group,
-        };
+        let head =
+            |((name, Numbers(q_rig_from_camera_wxyz)), limb_group): ((&String, Numbers<4>), Option<String>)| Head {
+                name: name.clone(),
+                sensor: None,
+                pictures: name.into(),
+                mount: Some(HeadMount { q_rig_from_camera_wxyz, sigma_deg: mount_sigma_deg, covariance_deg2: None }),
+                limb_group,
+            };
         let file = rig::Rig { rig: common, heads: names.iter().zip(mounts).zip(limb_groups).map(head).collect() };
         let states: Vec<_> = sensors.iter().map(|sensor| sensor.get().state()).collect();
         let configs = states.iter().map(|state| &state.config);
         let joiner = Joiner::new(&file, configs).map_err(errors::config)?;
-        Ok(Self { sensors, names, joiner: Arc::new(joiner) })
+        Ok(Self { sensors, names, file, joiner: Arc::new(joiner), completed: Mutex::default() })
     }
 
     #[doc = doc!("Rig.names")]
@@ -94,11 +99,11 @@ impl Rig {
         py: Python<'py>,
         images: &Bound<'py, PyDict>,
         altitude_km: Option<f64>,
-        position_km: Option<[f64; 3]>,
-        attitude: Option<[f64; 4]>,
+        position_km: Option<Numbers<3>>,
+        attitude: Option<Numbers<4>>,
         attitude_sigma_deg: Option<f64>,
-        rate_rad_s: Option<[f64; 3]>,
-        sun: Option<[f64; 3]>,
+        rate_rad_s: Option<Numbers<3>>,
+        sun: Option<Numbers<3>>,
         time_s: Option<f64>,
         camera_temperature_c: Option<f64>,
         bits: Option<u8>,
@@ -118,7 +123,7 @@ impl Rig {
         )?;
         let epoch = self.see(py, images, &known, bits, false)?;
         let seen: Vec<Seen<'_>> = epoch.frames.iter().map(|frame| Seen::new(frame.as_ref(), None)).collect();
-        self.answers(py, 0, &epoch, &seen)
+        Self::answers(py, 0, &epoch, &seen)
     }
 
     #[doc = doc!("Rig.process_many")]
@@ -140,7 +145,13 @@ impl Rig {
         // Sensors of its own, because single pictures that are processed meanwhile are not of the sequence.
         let own = |sensor: &Py<Sensor>| Py::new(py, sensor.get().for_sequence()?);
         let sensors = rig.sensors.iter().map(own).collect::<PyResult<_>>()?;
-        let own = Self { sensors, names: rig.names.clone(), joiner: Arc::clone(&rig.joiner) };
+        let own = Self {
+            sensors,
+            names: rig.names.clone(),
+            file: rig.file.clone(),
+            joiner: Arc::clone(&rig.joiner),
+            completed: Mutex::default(),
+        };
         many.call1((own, epochs, Some(1), progress))
     }
 
@@ -169,14 +180,17 @@ impl Rig {
         let epoch = epoch.ok_or_else(|| errors::other("this epoch is already joined"))?;
         let mut memory = memory.0.lock().unwrap_or_else(PoisonError::into_inner);
         let repeats = memory.find_repeats(&epoch.frames, &epoch.digests);
-        let seen = memory.see(&self.joiner, &epoch.frames, &repeats);
-        self.answers(py, index, &epoch, &seen)
+        let seen = memory.see(&epoch.joiner, &epoch.frames, &repeats);
+        Self::answers(py, index, &epoch, &seen)
     }
 
     fn __repr__(&self) -> String {
         format!("Rig({})", self.names.join(", "))
     }
 }
+
+/// For each head, the sensor with the bits and the tone of its picture file, if the file says more than the sensor.
+type Completed = Vec<Option<Arc<State>>>;
 
 /// The processed pictures of one epoch.
 struct Pictures {
@@ -185,6 +199,8 @@ struct Pictures {
     /// Checksums of their samples.
     digests: Vec<Option<u32>>,
     reports: Vec<(String, Report)>,
+    /// Joins the answers of pictures of their tones.
+    joiner: Arc<Joiner>,
 }
 
 /// An epoch of a sequence that is not joined yet.
@@ -215,12 +231,13 @@ impl Rig {
         is_of_sequence: bool,
     ) -> PyResult<Pictures> {
         self.check_names(images)?;
-        let mut seen = Pictures { frames: Vec::new(), digests: Vec::new(), reports: Vec::new() };
+        let (mut frames, mut digests, mut reports) = (Vec::new(), Vec::new(), Vec::new());
+        let mut completed = vec![None; self.names.len()];
         let heads = self.names.iter().zip(&self.sensors).zip(self.joiner.q_vehicle_from_camera_wxyz());
-        for ((name, sensor), q_vehicle_from_camera_wxyz) in heads {
+        for (((name, sensor), q_vehicle_from_camera_wxyz), completed) in heads.zip(&mut completed) {
             let Some(image) = images.get_item(name)?.filter(|image| !image.is_none()) else {
-                seen.frames.push(None);
-                seen.digests.push(None);
+                frames.push(None);
+                digests.push(None);
                 continue;
             };
             let state: Arc<_> = sensor.get().state();
@@ -228,31 +245,46 @@ impl Rig {
             let data = FrameData { utc_s: utc(known.data.time_s), ..known.data.clone() };
             let data = data.seen_by_camera(q_vehicle_from_camera_wxyz);
             let file = image.extract::<PathBuf>().ok().filter(|_| is_of_sequence);
-            let processed = see_picture(py, &state, &image, &data, bits, is_of_sequence);
+            let processed = see_picture(py, &state, &image, &data, bits, is_of_sequence, completed);
             let (frame, digest, report) = match (file, processed) {
                 (Some(file), Err(why)) if why.is_instance_of::<errors::ImageError>(py) => {
                     unreadable(py, &state, &file, data, &why)
                 }
                 (_, processed) => processed?,
             };
-            seen.frames.push(Some(frame));
-            seen.digests.push(digest);
-            seen.reports.push((name.clone(), report));
+            frames.push(Some(frame));
+            digests.push(digest);
+            reports.push((name.clone(), report));
         }
-        Ok(seen)
+        Ok(Pictures { frames, digests, reports, joiner: self.joiner_for(completed)? })
+    }
+
+    /// Returns the joiner for these sensors.
+    fn joiner_for(&self, completed: Completed) -> PyResult<Arc<Joiner>> {
+        if completed.iter().all(Option::is_none) {
+            return Ok(Arc::clone(&self.joiner));
+        }
+        let mut known = self.completed.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_same = |(a, b): (&Option<Arc<State>>, &Option<Arc<State>>)| match (a, b) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (a, b) => a.is_none() && b.is_none(),
+        };
+        if let Some((_, joiner)) = known.iter().find(|(other, _)| other.iter().zip(&completed).all(is_same)) {
+            return Ok(Arc::clone(joiner));
+        }
+        let state = |(sensor, own): (&Py<Sensor>, &Option<Arc<State>>)| own.clone().unwrap_or(sensor.get().state());
+        let states: Vec<_> = self.sensors.iter().zip(&completed).map(state).collect();
+        let joiner = Joiner::new(&self.file, states.iter().map(|state| &state.config)).map_err(errors::config)?;
+        let joiner = Arc::new(joiner);
+        known.push((completed, Arc::clone(&joiner)));
+        Ok(joiner)
     }
 
     /// Joins the answers of the heads.
-    fn answers<'py>(
-        &self,
-        py: Python<'py>,
-        index: u64,
-        epoch: &Pictures,
-        seen: &[Seen<'_>],
-    ) -> PyResult<Bound<'py, PyDict>> {
-        self.joiner.check_times(seen).map_err(errors::config)?;
+    fn answers<'py>(py: Python<'py>, index: u64, epoch: &Pictures, seen: &[Seen<'_>]) -> PyResult<Bound<'py, PyDict>> {
+        epoch.joiner.check_times(seen).map_err(errors::config)?;
         let all = PyDict::new(py);
-        all.set_item(JOINT, Bound::new(py, Report::from_row(self.joiner.join(index, seen)))?)?;
+        all.set_item(JOINT, Bound::new(py, Report::from_row(epoch.joiner.join(index, seen)))?)?;
         for (name, report) in &epoch.reports {
             all.set_item(name, Bound::new(py, number(py, report, index)?)?)?;
         }
@@ -283,13 +315,15 @@ fn see_picture(
     data: &FrameData,
     bits: Option<u8>,
     is_of_sequence: bool,
+    completed: &mut Option<Arc<State>>,
 ) -> PyResult<Processed> {
     let read = Read::from_object(py, state, image)?;
+    *completed = Some(Arc::clone(&read.state)).filter(|own| !Arc::ptr_eq(own, state));
     let time_s = data.time_s.or(read.time_s);
     let data = FrameData { time_s, utc_s: utc(time_s), ..data.clone() };
-    let (report, processed) = read.process(py, state, &data, bits, false)?;
+    let (report, processed) = read.process(py, &data, bits, false)?;
     let outcomes = processed.into_iter().map(Into::into).collect();
-    let glimpse = Some(read.glimpse(state, bits)?);
+    let glimpse = Some(read.glimpse(bits)?);
     let digest = is_of_sequence.then(|| read.digest()).transpose()?;
     Ok((Finished { glimpse, ..finished(read.file, data, outcomes) }, digest, report))
 }

@@ -18,6 +18,7 @@ use crate::camera::Camera;
 use crate::expected::Expected;
 use crate::image::{Array, View};
 use crate::mask::Seen;
+use crate::numbers::Numbers;
 use crate::prior::{Prior, utc};
 use crate::read::{Read, Shown};
 use crate::report::Report;
@@ -129,10 +130,10 @@ impl Sensor {
         &self,
         body: usize,
         altitude_km: Option<f64>,
-        position_km: Option<[f64; 3]>,
-        attitude: Option<[f64; 4]>,
+        position_km: Option<Numbers<3>>,
+        attitude: Option<Numbers<4>>,
         attitude_sigma_deg: Option<f64>,
-        rate_rad_s: Option<[f64; 3]>,
+        rate_rad_s: Option<Numbers<3>>,
         time_s: Option<f64>,
         camera_temperature_c: Option<f64>,
     ) -> PyResult<Expected> {
@@ -161,14 +162,14 @@ impl Sensor {
         py: Python<'_>,
         image: &Bound<'_, PyAny>,
         altitude_km: Option<f64>,
-        position_km: Option<[f64; 3]>,
-        attitude: Option<[f64; 4]>,
+        position_km: Option<Numbers<3>>,
+        attitude: Option<Numbers<4>>,
         attitude_sigma_deg: Option<f64>,
-        rate_rad_s: Option<[f64; 3]>,
+        rate_rad_s: Option<Numbers<3>>,
         range_km: Option<f64>,
         range_sigma_km: Option<f64>,
-        pole: Option<[f64; 3]>,
-        sun: Option<[f64; 3]>,
+        pole: Option<Numbers<3>>,
+        sun: Option<Numbers<3>>,
         time_s: Option<f64>,
         camera_temperature_c: Option<f64>,
         bits: Option<u8>,
@@ -193,7 +194,7 @@ impl Sensor {
         let read = Read::from_object(py, &state, image)?;
         let time_s = data.time_s.or(read.time_s);
         let data = FrameData { time_s, utc_s: utc(time_s), ..data };
-        Ok(read.process(py, &state, &data, bits, detail)?.0)
+        Ok(read.process(py, &data, bits, detail)?.0)
     }
 
     #[doc = doc!("Sensor.what_fits")]
@@ -203,15 +204,16 @@ impl Sensor {
         py: Python<'_>,
         image: &Bound<'_, PyAny>,
         altitude_km: Option<f64>,
-        position_km: Option<[f64; 3]>,
+        position_km: Option<Numbers<3>>,
         bits: Option<u8>,
     ) -> PyResult<Option<String>> {
         let Prior { data } =
             Prior::new(altitude_km, position_km, None, None, None, None, None, None, None, None, None)?;
-        let state = self.state();
-        let array = Array::from_object(image)?;
+        let read = Read::from_object(py, &self.state(), image)?;
+        let state = &read.state;
+        let array = Array::from_object(&read.image)?;
         state.check_size(&array)?;
-        let view = array.view(array.bits(bits, &state.config.input), state.config.input.channel)?;
+        let view = array.view(array.bits(bits.or(read.bits), &state.config.input), state.config.input.channel)?;
         let (config, lens) = (&state.config, &state.camera.lens);
         let mut trial = AnyCone::new(config, state.flight).map_err(errors::config)?;
         let fit = errors::detached(py, || match &view {
@@ -286,9 +288,9 @@ fn report_without_limb(meta: &RowMeta, why: PriorError) -> PyResult<Report> {
     }
 }
 
-/// Warns of unused bits in a picture in which nothing was found.
-fn warn_of_unused_bits(py: Python<'_>, array: &Array<'_>, bits: Option<u8>) -> PyResult<()> {
-    array.unused_bits(bits).map_or(Ok(()), |tip| errors::warn(py, format_args!("nothing found: {tip}")))
+/// Warns of samples that look wrong in a picture in which nothing was found.
+fn warn_of_samples(py: Python<'_>, array: &Array<'_>, bits: Option<u8>) -> PyResult<()> {
+    array.doubt_samples(bits).map_or(Ok(()), |tip| errors::warn(py, format_args!("nothing found: {tip}")))
 }
 
 impl<'py> Read<'py> {
@@ -298,7 +300,8 @@ impl<'py> Read<'py> {
     }
 
     /// Reads the brightness at places all over the picture, after [`Self::process`] accepted it.
-    pub(crate) fn glimpse(&self, state: &State, bits: Option<u8>) -> PyResult<Glimpse> {
+    pub(crate) fn glimpse(&self, bits: Option<u8>) -> PyResult<Glimpse> {
+        let state = &self.state;
         let array = Array::from_object(&self.image)?;
         let bits = array.bits(bits.or(self.bits), &state.config.input);
         Ok(match array.view(bits, state.config.input.channel)? {
@@ -312,11 +315,11 @@ impl<'py> Read<'py> {
     pub(crate) fn process(
         &self,
         py: Python<'py>,
-        state: &Arc<State>,
         data: &FrameData,
         bits: Option<u8>,
         detail: bool,
     ) -> PyResult<(Report, Vec<Processed>)> {
+        let state = &self.state;
         let bits = bits.or(self.bits);
         let array = Array::from_object(&self.image)?;
         state.check_size(&array)?;
@@ -347,11 +350,11 @@ impl<'py> Read<'py> {
         };
         let reports = processed.iter().zip(bodies).enumerate().map(report).collect::<PyResult<Vec<_>>>()?;
         if reports.iter().all(|report| !report.is_answer()) {
-            warn_of_unused_bits(py, &array, bits)?;
+            warn_of_samples(py, &array, bits)?;
         }
         let answers = processed.iter().map(|p| p.report.as_ref().ok()?.solution.as_ref());
         let report = Report::from_bodies(py, reports)?.with_seen(Seen::new(state, answers, Some(data)));
-        Ok((report.with_picture(Shown::new(self, state), bits), processed))
+        Ok((report.with_picture(Shown::new(self), bits), processed))
     }
 }
 

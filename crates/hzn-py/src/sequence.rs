@@ -4,12 +4,10 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use hzn_core::Config;
 use hzn_files::FrameData;
 use hzn_run::engine::{self, Finished, Plan, Turns};
 use hzn_run::open::{Opened, Request, SensorChoice, open};
 use hzn_run::source::{self, Payload, Source};
-use hzn_run::{Error, Kind};
 use pyo3::prelude::*;
 
 use crate::errors;
@@ -35,14 +33,6 @@ pub(crate) struct Item {
     item: Mutex<Option<source::Item>>,
 }
 
-/// Converts the reason why a run cannot begin or ends early to an exception.
-pub(crate) fn to_exception(error: Error) -> PyErr {
-    match error.kind() {
-        Kind::Unusable => errors::config(error),
-        Kind::Failed => errors::other(error),
-    }
-}
-
 #[pymethods]
 impl Sequence {
     #[new]
@@ -51,7 +41,7 @@ impl Sequence {
         let opened = errors::detached(py, || {
             let own = hzn_files::Sensor { config: state.config.clone(), text: String::new(), warnings: Vec::new() };
             let sensor = SensorChoice::Ready(Box::new(own));
-            open(&Request { inputs, sensor, flight: state.flight, ..Request::default() }).map_err(to_exception)
+            open(&Request { inputs, sensor, flight: state.flight, ..Request::default() }).map_err(errors::run)
         })??;
         // `hzn run` refuses such a sequence. Here every picture gets its report, which says the same.
         let doubts = [opened.check_size(), opened.check_altitude()];
@@ -60,14 +50,9 @@ impl Sequence {
         for warning in doubts.chain(warnings).chain(notes) {
             errors::warn(py, warning)?;
         }
-        // The limb height may follow from the tone of the pictures.
-        let state = if sensor.config.each_body() == state.config.each_body() {
-            state
-        } else {
-            state.with_config(Config { input: state.config.input, ..sensor.config.clone() })?
-        };
-        let mut plan = default_plan(&state, frames);
-        plan.config.input = sensor.config.input;
+        // The bits and the tone of the pictures.
+        let state = if sensor.config == state.config { state } else { state.with_config(sensor.config)? };
+        let plan = default_plan(&state, frames);
         Ok(Self { state, plan, source: Mutex::new(source), next: AtomicU64::new(0) })
     }
 
@@ -133,8 +118,13 @@ pub(crate) fn process_encoded(
     let state = sensor.state();
     let time_s = known.data.time_s.or(Some(index as f64));
     let row = FrameData { file: name.clone(), time_s, ..known.data.clone() };
-    let plan = default_plan(&state, None);
     let payload = data.map_or(Payload::Broken(why), Payload::Encoded);
+    let mut config = state.config.clone();
+    if let Some(found) = payload.tone().filter(|_| config.input.tone.is_none()) {
+        config.set_tone(found.tone);
+    }
+    let state = state.completed(config)?;
+    let plan = default_plan(&state, None);
     process_item(
         py,
         &state,

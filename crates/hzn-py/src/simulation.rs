@@ -17,7 +17,6 @@ use serde_json::{Value, json};
 use crate::camera::Camera;
 use crate::report::Report;
 use crate::sensor::Sensor;
-use crate::sequence::to_exception;
 use crate::{errors, parameters, view};
 
 #[doc = doc!("Simulation")]
@@ -194,7 +193,7 @@ pub(crate) fn evaluate<'py>(
     let mut camera = camera.map(|c| c.config.clone());
     let mut rows = match results.extract::<PathBuf>() {
         Ok(path) => {
-            let read = hzn_run::results::read(&path).and_then(Results::checked).map_err(to_exception)?;
+            let read = hzn_run::results::read(&path).and_then(Results::checked).map_err(errors::run)?;
             let Results { rows, sensor_toml, lost, .. } = read;
             lost.map_or(Ok(()), |lost| errors::warn(py, lost))?;
             let recorded = sensor_toml.and_then(|t| hzn_files::sensor::parse(&t, Path::new("sensor.toml")).ok());

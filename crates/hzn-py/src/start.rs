@@ -8,7 +8,7 @@ use hzn_files::sensor;
 use hzn_files::start::{Body, CameraFacts, write_sensor_toml};
 use hzn_run::open::Request;
 use hzn_run::source;
-use hzn_run::start::{LimbSays, find_doubt, measure_field_of_view, read_camera_facts};
+use hzn_run::start::{Check, LimbSays, check_start, measure_field_of_view, read_camera_facts};
 use pyo3::prelude::*;
 
 use crate::errors;
@@ -53,11 +53,15 @@ pub(crate) fn make(py: Python<'_>, said: &Said<'_>) -> PyResult<Config> {
     let (mut start, mut parsed) = write(&known)?;
     if known.has_focal() && !said.pictures.is_empty() {
         let request = said.request();
-        let doubt = errors::detached(py, || find_doubt(&request, &known, &start, &parsed.config))?;
-        if let Some(doubt) = doubt.map_err(errors::image)? {
-            errors::warn(py, in_python(&doubt.text))?;
-            known.doubt_percent = doubt.focal_percent;
-            (start, parsed) = write(&known)?;
+        let check = errors::detached(py, || check_start(&request, &known, &start, &parsed.config))?;
+        match check.map_err(errors::image)? {
+            Check::Agrees => {}
+            Check::Unchecked(text) => errors::warn(py, in_python(&text))?,
+            Check::Contradicted(doubt) => {
+                errors::warn(py, in_python(&doubt.text))?;
+                known.doubt_percent = doubt.focal_percent;
+                (start, parsed) = write(&known)?;
+            }
         }
     }
     start.warnings.iter().try_for_each(|warning| errors::warn(py, in_python(warning)))?;
@@ -89,6 +93,9 @@ fn complete(said: &Said<'_>) -> PyResult<CameraFacts> {
     }
     if body == Body::Sun && said.altitude_km.is_some() {
         return Err(errors::config("altitude_km: the Sun has one size from everywhere near the Earth; leave it out"));
+    }
+    if let Some(size) = said.size.filter(|(width, height)| ![width, height].iter().all(|n| (1..=65_535).contains(*n))) {
+        return Err(errors::config(format!("size: {size:?} is refused: width and height must be 1 to 65535 pixels")));
     }
     let read = match (said.pictures.as_slice(), said.size) {
         ([], Some((width, height))) => CameraFacts::of_size([width, height]),

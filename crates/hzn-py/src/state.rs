@@ -23,6 +23,8 @@ pub(crate) struct State {
     idle: Mutex<Vec<AnySensor>>,
     /// Whether the pictures are those of one sequence, in order and on one thread.
     in_sequence: bool,
+    /// The same with the bits and the tones of the picture files so far.
+    completed: Mutex<Vec<Arc<Self>>>,
 }
 
 impl State {
@@ -42,12 +44,27 @@ impl State {
         if self.in_sequence { Self::for_sequence(config, self.flight) } else { Self::new(config, self.flight) }
     }
 
+    /// Returns the state with the bits and the tone of a picture file, which a sensor without these keys takes from it.
+    pub(crate) fn completed(self: &Arc<Self>, config: Config) -> PyResult<Arc<Self>> {
+        if config == self.config {
+            return Ok(Arc::clone(self));
+        }
+        let mut completed = self.completed.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(state) = completed.iter().find(|state| state.config == config) {
+            return Ok(Arc::clone(state));
+        }
+        let state = self.with_config(config)?;
+        completed.push(Arc::clone(&state));
+        Ok(state)
+    }
+
     fn make(config: Config, flight: bool, sequence: Option<AnySensor>) -> PyResult<Arc<Self>> {
         let core = CoreSensor::new(&config).map_err(errors::config)?;
         let camera = Arc::new(Camera::from_config(config.camera.clone())?);
         let in_sequence = sequence.is_some();
         let idle = Mutex::new(sequence.into_iter().collect());
-        Ok(Arc::new(Self { config, flight, camera, core, idle, in_sequence }))
+        let completed = Mutex::default();
+        Ok(Arc::new(Self { config, flight, camera, core, idle, in_sequence, completed }))
     }
 
     /// Lends a sensor to `work`. A sensor in which `work` panicked is dropped.

@@ -7,6 +7,7 @@ use hzn_run::source::picture::{Picture, Samples};
 use hzn_sim::{Pose, Scenario, scenario};
 use pyo3::prelude::*;
 
+use crate::numbers::Numbers;
 use crate::prior::check_attitude;
 use crate::sensor::Sensor;
 use crate::{errors, image, parameters};
@@ -17,12 +18,13 @@ use crate::{errors, image, parameters};
 pub(crate) fn render<'py>(
     py: Python<'py>,
     sensor: &Sensor,
-    position_km: [f64; 3],
-    attitude: [f64; 4],
+    position_km: Numbers<3>,
+    attitude: Numbers<4>,
     time_s: f64,
     world: Option<&Bound<'py, PyAny>>,
     seed: Option<u64>,
 ) -> PyResult<Bound<'py, PyAny>> {
+    let (Numbers(position_km), Numbers(attitude)) = (position_km, attitude);
     if !(position_km.iter().all(|x| x.is_finite()) && time_s.is_finite()) {
         return Err(errors::config("position_km and time_s: finite numbers are expected"));
     }

@@ -87,6 +87,7 @@ def test_a_start_by_the_size_alone(tmp_path, hzn_program):
         (dict(size=(320, 240), fov_deg=60, lens="fish"), "lens: \"fish\" is refused"),
         (dict(size=(320, 240), fov_deg=60, body="vulcan"), "body: \"vulcan\" is refused"),
         (dict(size=(320, 240), fov_deg=60, altitude_km=-1), "altitude_km: -1 is refused"),
+        (dict(size=(0, 240), fov_deg=60), r"size: \(0, 240\) is refused: width and height must be 1 to 65535"),
     ],
 )
 def test_a_refused_start_names_the_argument(arguments, message):
@@ -262,3 +263,34 @@ def test_a_time_since_the_start_of_the_flight_is_no_utc():
     bare, timed, dated = (sensor.process(image, position_km=position, time_s=t) for t in (None, 10.0, NOON + 43_200))
     assert (timed.status, timed.sigma_max_deg, timed.time_s) == (bare.status, bare.sigma_max_deg, 10.0)
     assert bare.ok and (dated.status, dated.sigma_max_deg) != (bare.status, bare.sigma_max_deg)
+
+
+def test_a_start_that_nothing_checks_warns():
+    # The limb of one narrow picture is almost straight, and fits other fields of view as well.
+    with pytest.warns(UserWarning, match="the field of view of 38.0 degrees and the altitude are checked only roughly"):
+        hzn.Sensor.start(PHOTOGRAPH, fov_deg=38, altitude_km=418)
+    for wrong in (dict(fov_deg=60, altitude_km=418), dict(fov_deg=38, altitude_km=1500)):
+        with pytest.warns(UserWarning, match="contradicts the field of view or the altitude"):
+            hzn.Sensor.start(PHOTOGRAPH, **wrong)
+    with pytest.warns(UserWarning, match="fov_deg=0.66 is in degrees; if it is in radians, write fov_deg=37.8"):
+        hzn.Sensor.start(size=(320, 240), fov_deg=0.66, altitude_km=418)
+
+
+def test_another_count_of_numbers_is_named(sensor):
+    with pytest.raises(TypeError, match=r"4 numbers are expected, not 3: a quaternion is \(w, x, y, z\)\n.*'attitude'"):
+        sensor.process(limb(), attitude=[0.0, 0.0, 1.0])
+    with pytest.raises(TypeError, match="3 numbers are expected, not 2\n.*'position_km'"):
+        sensor.process(limb(), position_km=[0.0, 0.0])
+    assert sensor.process(limb(), position_km=np.array([6771.0, 0.0, 0.0])).ok
+
+
+def test_samples_that_look_wrong_are_told(sensor):
+    kelvin = limb() / 10.0
+    assert sensor.process(kelvin).ok
+    kelvin[120, 160] = 1e5
+    with pytest.warns(UserWarning, match="of the numbers lie in 0.0. % of the range .* hot pixel"):
+        assert not sensor.process(kelvin).ok
+    words = limb().astype(np.uint16) * 16
+    assert sensor.process(words, bits=12).ok
+    with pytest.warns(UserWarning, match="the largest sample is 3200, which has 12 bits, but bits = 8 was told"):
+        assert not sensor.process(words, bits=8).ok

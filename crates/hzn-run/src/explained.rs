@@ -362,7 +362,7 @@ impl Explained<'_> {
         let mut tips: Vec<String> = self.is_dark.then(|| dark.to_owned()).into_iter().collect();
         let subject = Subject::new(self.body, Some(self.half_angle));
         tips.extend(advice::tips(self.report, subject).into_iter().map(Cow::into_owned));
-        tips.extend(self.picture.unused_bits());
+        tips.extend(self.picture.doubt_samples());
         if tips.is_empty() {
             tips.push("look at the edges that were found, with --overlay out.png".to_owned());
         }

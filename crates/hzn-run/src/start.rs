@@ -165,6 +165,17 @@ fn find_altitude(
     }))
 }
 
+/// What the limb says about the field of view and the altitude that were told.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Check {
+    /// They agree with the limb.
+    Agrees,
+    /// The limb contradicts them.
+    Contradicted(Doubt),
+    /// The limb says too little to check a field of view that was told, in words.
+    Unchecked(String),
+}
+
 /// A contradiction between the limb and what was told.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Doubt {
@@ -177,18 +188,21 @@ pub struct Doubt {
 }
 
 /// Finds out whether the limb contradicts the field of view (that was told, or that of the EXIF) or the altitude, and
-/// which values would fit. `config` is the sensor that was made from `start`. `None` if they agree, or if the limb
-/// says nothing.
+/// which values would fit. `config` is the sensor that was made from `start`.
 ///
 /// # Errors
 /// A file cannot be read.
-pub fn find_doubt(
+pub fn check_start(
     request: &Request,
     known: &CameraFacts,
     start: &StartConfig,
     config: &hzn_core::Config,
-) -> Result<Option<Doubt>, Error> {
-    let Some((limb, focal_percent)) = doubt_field_of_view(request, known, start)? else { return Ok(None) };
+) -> Result<Check, Error> {
+    let without = CameraFacts { fov_deg: None, exif: Exif::default(), lens: Some(start.lens), ..known.clone() };
+    let says = measure_field_of_view(request, &without)?;
+    let unchecked = say_unchecked(&says, known, start).map_or(Check::Agrees, Check::Unchecked);
+    let (LimbSays::FieldOfView(limb) | LimbSays::Uncertain(limb)) = says else { return Ok(unchecked) };
+    let Some(focal_percent) = doubt_focal(&limb, known, start) else { return Ok(unchecked) };
     let [kept, seen] = limb.pictures;
     let altitude = find_altitude(request, known, config)?.map(|altitude| {
         let FittingAltitude { given_km, fitting_km: Implied { value, sigma }, pictures } = altitude;
@@ -212,23 +226,38 @@ pub fn find_doubt(
         start.fov_deg,
         altitude.unwrap_or_default()
     );
-    Ok(Some(Doubt { text, focal_percent }))
+    Ok(Check::Contradicted(Doubt { text, focal_percent }))
 }
 
-/// Compares a field of view that was told (or that of the EXIF) with that of the limb. Returns the latter if the
-/// two disagree, with the 1-sigma in percent that would explain it; `None` if they agree, or if the limb says nothing.
-///
-/// # Errors
-/// A file cannot be read.
-fn doubt_field_of_view(
-    request: &Request,
-    known: &CameraFacts,
-    start: &StartConfig,
-) -> Result<Option<(FieldOfView, f64)>, Error> {
-    let without = CameraFacts { fov_deg: None, exif: Exif::default(), lens: Some(start.lens), ..known.clone() };
-    let LimbSays::FieldOfView(found) = measure_field_of_view(request, &without)? else { return Ok(None) };
-    let of_limb = start::focal_px(start.lens, f64::from(known.size_px[0]), found.measured.fov_deg);
-    let sigma = 0.01 * found.measured.focal_sigma_percent.hypot(start.focal_sigma_percent);
-    let needed = of_limb.map(|px| (px / start.focal_px).ln().abs() / DOUBTFUL_SIGMAS).filter(|needed| *needed > sigma);
-    Ok(needed.map(|needed| (found, 100.0 * (needed * needed - sigma * sigma).sqrt())))
+/// Compares the focal length of a sensor with that of the limb. Returns the 1-sigma in percent that would explain the
+/// difference, if the sigmas of both do not.
+fn doubt_focal(limb: &FieldOfView, known: &CameraFacts, start: &StartConfig) -> Option<f64> {
+    let of_limb = start::focal_px(start.lens, f64::from(known.size_px[0]), limb.measured.fov_deg)?;
+    let sigma = 0.01 * limb.measured.focal_sigma_percent.hypot(start.focal_sigma_percent);
+    let needed = (of_limb / start.focal_px).ln().abs() / DOUBTFUL_SIGMAS;
+    (needed > sigma).then(|| 100.0 * (needed * needed - sigma * sigma).sqrt())
+}
+
+/// Says that nothing has checked the field of view that was told as well as its sigma says. The camera itself writes
+/// an EXIF, which needs no such word. `None` without an altitude: there is nothing to compare with, and another message
+/// asks for it.
+fn say_unchecked(limb: &LimbSays, known: &CameraFacts, start: &StartConfig) -> Option<String> {
+    known.fov_deg?;
+    let why = match limb {
+        LimbSays::Uncertain(limb) => {
+            let [kept, seen] = limb.pictures;
+            format!(
+                "checked only roughly: the limb in {kept} of {seen} pictures says {}",
+                limb.describe(known.size_px[0])
+            )
+        }
+        LimbSays::Nothing(seen) => format!("not checked: the limb in {seen} pictures does not say it"),
+        LimbSays::FieldOfView(_) | LimbSays::LensDecides(_) | LimbSays::NoAltitude => return None,
+    };
+    Some(format!(
+        "the field of view of {:.1} degrees and the altitude are {why}. If the field of view is wrong by more than \
+         {:.0} %, answers are wrong by more than 3 sigma. More pictures, with the limb in other places, check it",
+        start.fov_deg,
+        3.0 * start.focal_sigma_percent
+    ))
 }

@@ -10,7 +10,7 @@ use hzn_files::{Problem, plausible};
 use hzn_run::diagnosis::FieldOfView;
 use hzn_run::open::{self, Request};
 use hzn_run::source::{self, Source};
-use hzn_run::start::{LimbSays, find_doubt, measure_field_of_view, read_camera_facts};
+use hzn_run::start::{Check, LimbSays, check_start, measure_field_of_view, read_camera_facts};
 use hzn_run::{disk, explain};
 
 use super::init_rig;
@@ -154,13 +154,13 @@ pub(super) fn run(args: &Args) -> Outcome {
         tell::line(format_args!("the limb in {kept} of {seen} pictures says: {}", found.describe(known.size_px[0])));
     }
     tell_start(args, &known, &start);
-    tell_radians(args);
     tell_circle(&start);
     tell_width(args, &known, start.lens);
     finish(args, &start.text, &known)
 }
 
-/// Returns the file to start from, and what the limb contradicts of it. A contradiction makes its sigma larger.
+/// Returns the file to start from, and what the limb contradicts of it, or that the limb cannot check it. A
+/// contradiction makes its sigma larger.
 fn checked_start(args: &Args, known: &mut CameraFacts) -> Result<(StartConfig, Option<String>), Stop> {
     let write = |known: &CameraFacts| -> Result<_, Stop> {
         let start = start::write_sensor_toml(known).map_err(usage)?;
@@ -169,10 +169,15 @@ fn checked_start(args: &Args, known: &mut CameraFacts) -> Result<(StartConfig, O
         Ok((start, parsed.config))
     };
     let (start, config) = write(known)?;
-    let doubt = if known.has_focal() { find_doubt(&request(args), known, &start, &config)? } else { None };
-    let Some(doubt) = doubt else { return Ok((start, None)) };
-    known.doubt_percent = doubt.focal_percent;
-    Ok((write(known)?.0, Some(doubt.text)))
+    let check = if known.has_focal() { check_start(&request(args), known, &start, &config)? } else { Check::Agrees };
+    match check {
+        Check::Agrees => Ok((start, None)),
+        Check::Unchecked(text) => Ok((start, Some(text))),
+        Check::Contradicted(doubt) => {
+            known.doubt_percent = doubt.focal_percent;
+            Ok((write(known)?.0, Some(doubt.text)))
+        }
+    }
 }
 
 fn tell_start(args: &Args, known: &CameraFacts, start: &StartConfig) {
@@ -187,16 +192,6 @@ fn tell_start(args: &Args, known: &CameraFacts, start: &StartConfig) {
         start.focal_sigma_percent,
         start.k1_sigma,
     ));
-}
-
-/// Asks for the unit of a narrow field of view that would be that of a usual camera in radians.
-fn tell_radians(args: &Args) {
-    if let Some(fov) = args.fov.filter(|fov| (20.0..180.0).contains(&fov.to_degrees())) {
-        tell::warning(format_args!(
-            "--fov {fov} is in degrees; if it is in radians, write --fov {:.1}",
-            fov.to_degrees()
-        ));
-    }
 }
 
 /// Says that the width is that of the stored picture, if the camera was turned.

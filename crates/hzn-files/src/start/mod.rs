@@ -70,7 +70,9 @@ pub fn write_sensor_toml(facts: &CameraFacts) -> Result<StartConfig, String> {
         })
     });
     let known = stated.transpose()?.or(measured.filter(|_| exif.is_err()));
-    let (mut focal, warnings, comparison) = choose_focal(known, exif, lens, width)?;
+    let (mut focal, mut warnings, comparison) = choose_focal(known, exif, lens, width)?;
+    // A telescope that looks at the Sun has such a field of view.
+    warnings.extend(facts.fov_deg.filter(|_| facts.body != Body::Sun).and_then(doubt_unit));
     if let Some(percent) = facts.doubt_percent {
         (focal.percent, focal.sigma_from) =
             (focal.percent.hypot(percent), "a stated field of view that the limb contradicts");
@@ -120,6 +122,14 @@ fn choose_lens(given: Option<Model>, fov_deg: Option<f64>) -> Result<Model, Stri
         )),
         given => Ok(given.unwrap_or(Model::Pinhole)),
     }
+}
+
+/// Asks for the unit of a narrow field of view that would be that of a usual camera in radians.
+fn doubt_unit(fov_deg: f64) -> Option<String> {
+    let if_radians = fov_deg.to_degrees();
+    (20.0..180.0)
+        .contains(&if_radians)
+        .then(|| format!("--fov {fov_deg} is in degrees; if it is in radians, write --fov {if_radians:.1}"))
 }
 
 /// The chosen focal length, warnings, and a note about the other focal length.

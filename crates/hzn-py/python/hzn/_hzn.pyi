@@ -521,8 +521,9 @@ class Sensor:
         image
             Shape (height, width) or (height, width, channels), uint8 or uint16, with any strides. It is not copied; C
             order is fastest. Of an array of floats, such as temperatures, the smallest becomes 8192 and the largest
-            57344 of 65535, and what lies between keeps its place on the line; the scale moves no limb. A number that is
-            not finite becomes 8192. Or the path of a picture file, which is read as by ``hzn run``.
+            57344 of 65535, and what lies between keeps its place on the line. Another scale or offset moved the limb of
+            a photograph by a tenth of its sigma. A number that is not finite becomes 8192. Or the path of a picture
+            file, which is read as by ``hzn run``.
         altitude_km
             Above WGS-84 for ``earth``, otherwise above the radius. Without it, the parameters' altitude is used.
         position_km

@@ -103,7 +103,7 @@ fn look_at_pixels(plan: &Plan, sensor: &AnySensor, picture: &Picture, finished: 
     let camera = sensor.camera_of(finished.data.as_ref());
     finished.brightness_by_sun = brightness_by_sun(&plan.config, picture, &camera, finished);
     if finished.outcomes.iter().all(|f| f.report.as_ref().is_ok_and(|r| r.status != Status::Ok)) {
-        finished.tip = picture.unused_bits();
+        finished.tip = picture.doubt_samples();
     }
 }
 

@@ -46,6 +46,17 @@ impl Levels {
         };
         (bits + UNUSED_BITS <= 16).then(|| format!("the largest sample is {largest} of 65535: {}", fewer()))
     }
+
+    /// Returns advice if a sample needs more bits than were told: it then counts as clipped.
+    pub fn exceed(&self, bits: u8) -> Option<String> {
+        let (largest, needed) = (self.largest, 16 - self.largest.leading_zeros());
+        (needed > u32::from(bits)).then(|| {
+            format!(
+                "the largest sample is {largest}, which has {needed} bits, but bits = {bits} was told: set bits = \
+                 {needed}"
+            )
+        })
+    }
 }
 
 /// Says in words what samples mean that use only the upper bits.
@@ -96,6 +107,7 @@ mod tests {
         let two: Levels = [0, 4080, 0, 4080].into_iter().collect();
         assert_eq!(two.upper_bits(), None);
         assert!(two.advice().is_some());
+        assert!(two.exceed(16).is_none() && two.exceed(8).is_some_and(|text| text.contains("set bits = 16")));
     }
 
     #[test]

@@ -82,9 +82,9 @@ impl Payload {
     }
 
     /// Returns what a picture file says about its tone.
-    pub(super) fn tone(self) -> Option<FoundTone> {
+    pub fn tone(&self) -> Option<FoundTone> {
         match self {
-            Self::File(path) => tone::read(open_file(&path).ok()?),
+            Self::File(path) => tone::read(open_file(path).ok()?),
             Self::Encoded(bytes) => tone::read(std::io::Cursor::new(bytes)),
             // Words of a message are the samples of a detector, as those of a file are.
             Self::Decoded(picture) if picture.layout.bits > 8 => {

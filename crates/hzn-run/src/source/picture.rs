@@ -106,10 +106,14 @@ impl Picture {
         }
     }
 
-    /// Returns advice for a picture without an answer whose upper bits are all unused, if the number of bits is not
-    /// known.
-    pub fn unused_bits(&self) -> Option<String> {
-        self.levels().filter(|_| self.layout.bits == 16)?.advice()
+    /// Returns advice for a picture without an answer: its upper bits are all unused though the number of bits is not
+    /// known, its samples have more bits than were told, or few numbers set the scale of the others.
+    pub fn doubt_samples(&self) -> Option<String> {
+        let Samples::Words(words) = &self.samples else { return None };
+        match self.layout.bits {
+            16 => hzn_mcap::doubt_scale(words).or_else(|| self.levels()?.advice()),
+            bits => self.levels()?.exceed(bits),
+        }
     }
 
     /// Returns a view of the picture for the pipeline.
