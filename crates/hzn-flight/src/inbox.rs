@@ -196,6 +196,12 @@ impl Inbox {
         self.effort = 0;
     }
 
+    /// Returns whether there is nothing for [`Self::next`] although bytes have come: all of them were left out. Without
+    /// a pause before them, nothing else depends on the time.
+    pub fn is_empty(&self) -> bool {
+        self.start == self.end
+    }
+
     /// Passes the next packet to `handle`, or `None` for a broken packet. Returns the result of `handle`; `None` if
     /// there is no packet yet. All bytes that have arrived until `now_us` must have been added.
     pub fn next<R>(&mut self, now_us: u64, handle: impl FnOnce(Option<Packet<'_>>) -> R) -> Option<R> {
@@ -244,7 +250,7 @@ impl Inbox {
         if self.checked == 0 {
             // The checksum counts as work, because packets inside packets would make it again for every marker.
             self.effort += length;
-            if packet::read(whole).is_none() {
+            if !packet::is_whole(whole) {
                 return BROKEN;
             }
             self.checked = length;
@@ -283,7 +289,7 @@ impl Inbox {
                 return Step::More;
             };
             self.effort += next.len();
-            if packet::read(next).is_none() {
+            if !packet::is_whole(next) {
                 return refused;
             }
             self.checked = need;

@@ -210,11 +210,14 @@ pub(crate) fn length(header: &[u8; SYNC.len() + HEADER]) -> Option<usize> {
 
 /// Reads a packet from its marker to its checksum; `None` if the checksum is wrong.
 pub(crate) fn read(bytes: &[u8]) -> Option<Packet<'_>> {
-    let (checked, crc) = bytes.get(SYNC.len()..)?.split_last_chunk::<CRC>()?;
-    if CRC16.checksum(checked) != u16::from_be_bytes(*crc) {
-        return None;
-    }
-    parse(bytes)
+    is_whole(bytes).then(|| parse(bytes))?
+}
+
+/// Returns whether the checksum of a packet of a possible [`length`] is right. It reads no field, because the inbox
+/// reads the fields later, once.
+pub(crate) fn is_whole(bytes: &[u8]) -> bool {
+    let parts = bytes.get(SYNC.len()..).and_then(<[u8]>::split_last_chunk::<CRC>);
+    parts.is_some_and(|(checked, crc)| CRC16.checksum(checked) == u16::from_be_bytes(*crc))
 }
 
 /// Reads the fields of a packet whose checksum is known to be right.

@@ -61,6 +61,10 @@ impl<B: Board> Flight<'_, B> {
                     Some(is_command) => is_done = is_command,
                     None => break,
                 }
+                // Bytes have just come, so that an empty inbox cannot show a pause.
+                if filled == Filled::Ready && uplink.inbox.is_empty() {
+                    break;
+                }
             }
             if filled != Filled::Ready {
                 break;

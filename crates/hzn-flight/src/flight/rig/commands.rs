@@ -46,6 +46,10 @@ impl<B: RigBoard, const N: usize> Rig<'_, '_, B, N> {
                     Some(is_command) => is_done = is_command,
                     None => break,
                 }
+                // Bytes have just come, so that an empty inbox cannot show a pause.
+                if filled == crate::inbox::Filled::Ready && self.buffers.uplink.inbox.is_empty() {
+                    break;
+                }
             }
             if filled != crate::inbox::Filled::Ready {
                 break;
