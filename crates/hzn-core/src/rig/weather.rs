@@ -125,8 +125,8 @@ fn taken_up<T: Real>(arcs: &[[T; 2]], middle: T, sin: T, chords: T) -> Option<M3
         let width = (to - from) / T::from_i32(count);
         for i in 0..count {
             let delta = from - middle + (T::from_i32(i) + half) * width;
-            let (s, _) = delta.sin_cos();
-            let (h, _) = (delta * half).sin_cos();
+            let s = delta.sin();
+            let h = (delta * half).sin();
             let versine = two * h * h;
             (scale_sin, scale_cos) = (scale_sin.max(s.abs()), scale_cos.max(versine));
             // There is room for all of them, see `MOST`.
@@ -140,7 +140,7 @@ fn taken_up<T: Real>(arcs: &[[T; 2]], middle: T, sin: T, chords: T) -> Option<M3
         *row = inverse * scaled(row) * row.x;
     }
     let both = |a: T, b: T| {
-        let (chord, _) = ((a - b) * half).sin_cos();
+        let chord = ((a - b) * half).sin();
         let chord = chords * chord;
         (-half * chord * chord).exp()
     };
@@ -184,11 +184,31 @@ impl<T: Real> Edge<'_, T> {
     /// Returns whether the picture has the edge at this azimuth.
     fn is_in_view(&self, psi: T) -> bool {
         let (s, c) = psi.sin_cos();
+        self.is_at(s, c)
+    }
+
+    /// Returns the same for the sine and the cosine of an azimuth.
+    fn is_at(&self, s: T, c: T) -> bool {
         let ray = self.e * self.cos + (self.b[0] * c + self.b[1] * s) * self.sin;
         let point = self.camera.project(&UnitVec3::<Cam, T>::assume_unit(ray));
         let half = T::from_f64(0.5);
         let inside = |x: T, size: u16| x >= -half && x <= T::from_i32(size.into()) - half;
         point.is_some_and(|p| inside(p.u, self.camera.width()) && inside(p.v, self.camera.height()))
+    }
+
+    /// Returns a function that says whether the picture has the edge at the azimuth `first`, at its second call at
+    /// `first + step`, and so on.
+    ///
+    /// It turns the direction by the step. The sine and the cosine of every azimuth would be two thirds of a joint
+    /// answer on a Cortex-M4F, because libm computes them in double precision. Rounding adds up to less than 1e-4 rad
+    /// in an `f32`, and [`Self::end`] finds the ends of the arcs with the azimuth itself.
+    fn in_turn(&self, first: T, step: T) -> impl FnMut() -> bool {
+        let ((mut s, mut c), (step_s, step_c)) = (first.sin_cos(), step.sin_cos());
+        move || {
+            let is_in_view = self.is_at(s, c);
+            (s, c) = (s * step_c + c * step_s, c * step_c - s * step_s);
+            is_in_view
+        }
     }
 
     /// Returns the arcs in view as pairs of azimuths, in rising order, within one turn.
@@ -216,13 +236,14 @@ impl<T: Real> Edge<'_, T> {
         let opposite = (-self.b[1].z).atan2(-self.b[0].z);
         let at = |i: usize| opposite + T::from_i32(i as i32) * step;
         let half = T::from_f64(0.5 * SHORTEST_RAD);
-        let Some(first) = (0..scan).find(|&i| !self.is_in_view(at(i))) else {
+        let mut is_next_in_view = self.in_turn(opposite, step);
+        let Some(first) = (0..scan).find(|_| !is_next_in_view()) else {
             let _ = arcs.push([opposite, opposite + T::from_f64(TAU)]);
             return arcs;
         };
         let mut start = None;
         for i in first + 1..=first + scan {
-            match (start, self.is_in_view(at(i))) {
+            match (start, is_next_in_view()) {
                 (None, true) => start = Some(self.end(at(i), at(i - 1))),
                 (Some(from), false) => {
                     let to = self.end(at(i - 1), at(i));
@@ -241,6 +262,10 @@ impl<T: Real> Edge<'_, T> {
     fn end(&self, mut seen: T, mut unseen: T) -> T {
         for _ in 0..30 {
             let half = (seen + unseen) * T::from_f64(0.5);
+            // No number lies between the two any more, in an `f32` after about 16 steps.
+            if half == seen || half == unseen {
+                break;
+            }
             *if self.is_in_view(half) { &mut seen } else { &mut unseen } = half;
         }
         seen
