@@ -84,8 +84,25 @@ fn same_bits_as_here() {
         }
     }
     let pictures = boards.len() * cases.len();
-    println!("{pictures} pictures on {} boards, {ok} answers", boards.len());
     assert!(2 * ok as usize >= pictures, "most pictures have an answer: {ok} of {pictures}");
+}
+
+/// Returns the pictures of a flight with a fixed threshold, as the image `rows` takes them.
+fn row_cases(mut flight: Flight) -> Vec<Case> {
+    flight.sensor.threshold = threshold::Config { method: threshold::Method::Fixed, level: 60.0, ..Default::default() };
+    let case = |frame: &hzn_sim::FlightFrame| Case {
+        prior: Prior { altitude_m: Some(frame.prior().altitude_m.unwrap_or(2e5) as f32), ..Prior::default() },
+        ..Case::rendered(frame.file.clone(), &flight.sensor, frame)
+    };
+    flight.frames.iter().map(case).collect()
+}
+
+/// Removes clouds and stars, whose edges would fill the lists of a small board.
+fn clear(flight: &mut Flight) {
+    for frame in &mut flight.frames {
+        frame.scene.disc = Disc::default();
+        frame.scene.sky = Sky { stars: 0, ..frame.scene.sky };
+    }
 }
 
 /// Tests that pictures taken row by row, without a picture in memory, give the answers of the same pictures in this
@@ -94,30 +111,43 @@ fn same_bits_as_here() {
 #[ignore = "needs the images: cargo xtask firmware"]
 fn rows_have_the_bits_of_the_picture() {
     let mut flight = rocket(640, 480, 8, 6);
-    flight.sensor.threshold = threshold::Config { method: threshold::Method::Fixed, level: 60.0, ..Default::default() };
-    let cases: Vec<Case> = flight
-        .frames
-        .iter()
-        .map(|frame| Case {
-            prior: Prior { altitude_m: Some(frame.prior().altitude_m.unwrap_or(2e5) as f32), ..Prior::default() },
-            ..Case::rendered(frame.file.clone(), &flight.sensor, frame)
-        })
-        .collect();
+    clear(&mut flight);
+    let (cases, mut same) = (row_cases(flight), 0);
     for board in Board::with_pictures() {
-        let mut whole = 0;
         for (case, there) in cases.iter().zip(measure_rows(board, &cases)) {
-            let host = case.answer_on_host();
-            assert_eq!((host.status, host.level), (there.answer.status, there.answer.level), "{}", case.name);
-            // If both dropped equally many pixels, the directions agree in every bit.
-            if there.answer.dropped == host.dropped {
-                whole += 1;
-                assert_eq!(host.direction, there.answer.direction, "{} on {}", case.name, board.core());
-            } else if let (Some(a), Some(b)) = (host.direction, there.answer.direction) {
-                let distance: f32 = a.axis.iter().zip(b.axis).map(|(a, b)| (a - b) * (a - b)).sum();
-                assert!(distance.sqrt().to_degrees() < 0.02, "{}: {}", case.name, distance.sqrt().to_degrees());
-            }
+            let (host, there, at) = (case.answer_on_host(), there.answer, format!("{} on {}", case.name, board.core()));
+            assert_eq!((host.status, host.level, host.dropped), (there.status, there.level, there.dropped), "{at}");
+            // The bits, because what is not known of a direction is NaN, which equals nothing.
+            let [here, sent] = [host, there].map(|answer| answer.direction.expect("an answer"));
+            let is_same = here.values().map(f64::to_bits).eq(sent.values().map(f64::to_bits));
+            // Rows lose points whose plateaus lie beyond the rows in memory: 3 of 478 in the second picture.
+            assert!(is_same || host.edge_points != there.edge_points, "{at}:\n{here:?}\n{sent:?}");
+            same += u32::from(is_same);
         }
-        println!("{}: {whole} of {} pictures without a full list", board.core(), cases.len());
+    }
+    // Of eight pictures, 4 on the Cortex-M4F and 8 on the Cortex-M7.
+    assert!(same >= 4, "{same} directions have the bits of the picture in memory");
+}
+
+/// Tests pictures with clouds, whose border pixels do not fit into the lists of the image `rows`. Pixels are left out
+/// evenly, so that an answer is near that of the picture in memory, and a picture may be refused: of the
+/// limb of the first one, 642 border pixels long, 16 to 19 points are left of 320, too few for an answer.
+#[test]
+#[ignore = "needs the images: cargo xtask firmware"]
+fn rows_have_no_other_direction_with_full_lists() {
+    let cases = row_cases(rocket(640, 480, 8, 6));
+    for board in Board::with_pictures() {
+        let mut answers = 0;
+        for (case, there) in cases.iter().zip(measure_rows(board, &cases)) {
+            let (host, there, at) = (case.answer_on_host(), there.answer, format!("{} on {}", case.name, board.core()));
+            assert!(there.dropped > host.dropped && host.level == there.level, "{at}");
+            let Some(own) = there.direction else { continue };
+            answers += 1;
+            let whole = host.direction.expect("the picture in memory has an answer");
+            let distance: f32 = whole.axis.iter().zip(own.axis).map(|(a, b)| (a - b) * (a - b)).sum();
+            assert!(distance.sqrt().to_degrees() < 0.02, "{at}: {}", distance.sqrt().to_degrees());
+        }
+        assert!(answers >= 7, "{}: {answers}", board.core());
     }
 }
 
@@ -127,11 +157,7 @@ fn rows_have_the_bits_of_the_picture() {
 #[ignore = "needs the images: cargo xtask firmware"]
 fn the_flight_loop_takes_rows_on_a_small_board() {
     let mut flight = rocket(640, 480, 8, 6);
-    // Without clouds and stars, whose edges would fill the lists of this small board.
-    for frame in &mut flight.frames {
-        frame.scene.disc = Disc::default();
-        frame.scene.sky = Sky { stars: 0, ..frame.scene.sky };
-    }
+    clear(&mut flight);
     flight.sensor.threshold = threshold::Config { method: threshold::Method::Fixed, level: 60.0, ..Default::default() };
     flight.sensor.body.altitude_km = Some(180.0);
     flight.sensor.body.altitude_sigma_km = 60.0;
@@ -360,7 +386,6 @@ fn a_turn_that_never_ends_is_ended_by_the_watchdog() {
         // the line too slowly: a telecommand must be complete within a second.
         assert_eq!(bench.run_in_parts(&[(0, &first), (400, &others)], 4), 0);
         let printed = hzn_run(bench.dir(), &["telemetry", "sent.bin"]);
-        println!("{printed}");
         assert_eq!(printed.matches("started with copy 1 of the parameters").count(), 2, "{printed}");
         assert_eq!(printed.matches("reset by the watchdog").count(), 1, "{printed}");
         assert!(printed.contains("standby to shut-down mode"), "{printed}");
@@ -422,6 +447,5 @@ fn the_example_of_the_documents_fits_into_192_kib() {
     let (there, stack_bytes) = run_example(&case.bytes);
     assert_eq!(there, answer_bytes(&host));
     let bound = stack_bound(&Board::Stm32F405.image("example")).unwrap().bytes;
-    println!("most stack {stack_bytes} bytes, at most {bound} by the calls");
     assert!((4096..=bound).contains(&stack_bytes) && bound < 64 * 1024);
 }
