@@ -194,7 +194,6 @@ fn the_flight_loop_takes_rows_on_a_small_board() {
     println!("{} pictures by rows, {whole} answers without a full list; most stack {stack} of 65536 bytes", sent.len());
     assert!(sent.len() == 8 && whole == 8 && (4096..60_000).contains(&stack));
     let bound = stack_bound(&Board::Stm32F405.image("flight")).unwrap();
-    println!("at most {} bytes by the calls", bound.bytes);
     assert!((stack..60_000).contains(&bound.bytes));
 }
 
