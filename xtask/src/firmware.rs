@@ -192,7 +192,7 @@ fn test_images_once(steps: &mut Steps) -> Outcome {
     let alone = "firmware::the_sensor_alone";
     run_image_tests(steps, AN386.name, &[alone])?;
     // These need other images.
-    let other = ["firmware::same_bits", "firmware::rows_have", "small_board", "example_of_the_documents"];
+    let other = ["firmware::same_bits", "rows_image::", "small_board", "example_of_the_documents"];
     let skipped = other.iter().chain([&alone]).flat_map(|name| ["--skip", name]);
     let files = ["firmware::", "navigation::", "recovery::", "silence::"];
     run_image_tests(steps, AN500.name, &files.into_iter().chain(skipped).collect::<Vec<_>>())?;
@@ -216,6 +216,7 @@ fn test_every_image(steps: &mut Steps) -> Outcome {
             "navigation::",
             "recovery::",
             "rig_image::",
+            "rows_image::",
             "silence::",
         ],
     )?;

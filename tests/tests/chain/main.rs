@@ -25,6 +25,7 @@ mod recovery;
 mod rendered;
 mod rig_image;
 mod rows;
+mod rows_image;
 mod silence;
 mod suns;
 mod wrong_altitude;
