@@ -11,7 +11,7 @@ use hzn_core::{Config, FlightHorizon, Prior, camera};
 use hzn_flight::answer::PictureAnswer;
 use hzn_flight::flight::{Buffers, Lists};
 use hzn_host::Compiled;
-use hzn_sim::flight::{leo_infrared, rocket};
+use hzn_sim::flight::{Flight, leo_infrared, rocket};
 use hzn_tests::emulated::{Board, Case, answer_bytes, chain_sensor, measure, run_chain, run_example};
 use hzn_tests::flight_image::{Bench, hzn_run};
 use hzn_tests::real::Photograph;
