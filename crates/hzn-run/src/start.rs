@@ -16,6 +16,9 @@ const PICTURES: u64 = 8;
 /// Difference of the field of view that was told from that of the limb that is worth a warning, in sigmas of both. A
 /// data sheet that is wrong by that much is worth a look, because its error is the same in every picture.
 const DOUBTFUL_SIGMAS: f64 = 1.5;
+/// Sigma of the limb's focal length that is a check, in sigmas of the told one: an error of three told sigmas is then
+/// [`DOUBTFUL_SIGMAS`] of the limb's.
+const ENOUGH: f64 = 2.0;
 
 /// The field of view that the limb in the pictures says.
 #[derive(Debug, Clone, PartialEq)]
@@ -244,7 +247,7 @@ fn doubt_focal(limb: &FieldOfView, known: &CameraFacts, start: &StartConfig) -> 
 fn say_unchecked(limb: &LimbSays, known: &CameraFacts, start: &StartConfig) -> Option<String> {
     known.fov_deg?;
     let why = match limb {
-        LimbSays::Uncertain(limb) => {
+        LimbSays::Uncertain(limb) if limb.measured.focal_sigma_percent > ENOUGH * start.focal_sigma_percent => {
             let [kept, seen] = limb.pictures;
             format!(
                 "checked only roughly: the limb in {kept} of {seen} pictures says {}",
@@ -252,7 +255,7 @@ fn say_unchecked(limb: &LimbSays, known: &CameraFacts, start: &StartConfig) -> O
             )
         }
         LimbSays::Nothing(seen) => format!("not checked: the limb in {seen} pictures does not say it"),
-        LimbSays::FieldOfView(_) | LimbSays::LensDecides(_) | LimbSays::NoAltitude => return None,
+        _ => return None,
     };
     Some(format!(
         "the field of view of {:.1} degrees and the altitude are {why}. If the field of view is wrong by more than \
