@@ -42,7 +42,7 @@ fn rows_have_the_bits_of_the_picture() {
         for (case, there) in cases.iter().zip(measure_rows(board, &cases)) {
             let (host, there, at) = (case.answer_on_host(), there.answer, format!("{} on {}", case.name, board.core()));
             assert_eq!((host.status, host.level, host.dropped), (there.status, there.level, there.dropped), "{at}");
-            // The bits, because what is not known of a direction is NaN, which equals nothing.
+            // The bits are compared, because unknown parts of a direction are NaN, and NaN equals nothing.
             let [here, sent] = [host, there].map(|answer| answer.direction.expect("an answer"));
             let is_same = here.values().map(f64::to_bits).eq(sent.values().map(f64::to_bits));
             // Rows lose points whose plateaus lie beyond the rows in memory: 3 of 478 in the second picture.
