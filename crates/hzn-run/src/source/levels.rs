@@ -50,11 +50,12 @@ impl Levels {
     /// Returns advice if a sample needs more bits than were told: it then counts as clipped.
     pub fn exceed(&self, bits: u8) -> Option<String> {
         let (largest, needed) = (self.largest, 16 - self.largest.leading_zeros());
+        let cure = || match self.upper_bits() {
+            Some(upper) => of_upper_bits(upper),
+            None => format!("set bits = {needed}"),
+        };
         (needed > u32::from(bits)).then(|| {
-            format!(
-                "the largest sample is {largest}, which has {needed} bits, but bits = {bits} was told: set bits = \
-                 {needed}"
-            )
+            format!("the largest sample is {largest}, which has {needed} bits, but bits = {bits} was told: {}", cure())
         })
     }
 }
@@ -107,7 +108,8 @@ mod tests {
         let two: Levels = [0, 4080, 0, 4080].into_iter().collect();
         assert_eq!(two.upper_bits(), None);
         assert!(two.advice().is_some());
-        assert!(two.exceed(16).is_none() && two.exceed(8).is_some_and(|text| text.contains("set bits = 16")));
+        assert!(two.exceed(12).is_none() && two.exceed(8).is_some_and(|text| text.ends_with("set bits = 12")));
+        assert!(upper.exceed(16).is_none() && upper.exceed(12).is_some_and(|text| text.ends_with("set bits = 16")));
     }
 
     #[test]
