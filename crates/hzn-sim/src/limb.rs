@@ -123,10 +123,10 @@ impl Outline<'_> {
         }
     }
 
-    /// Returns whether the limb at an azimuth is in sunlight and not hidden by rings.
-    fn is_lit(&self, azimuth_rad: f64) -> bool {
+    /// Returns whether the limb at an azimuth, where it has this direction, is in sunlight and not hidden by rings.
+    fn is_lit(&self, azimuth_rad: f64, direction: &UnitVec3<Cam, f64>) -> bool {
         match self {
-            Self::Globe(globe) => globe.painter.lit_share(globe.ray(azimuth_rad)) > 0.5,
+            Self::Globe(globe) => globe.painter.lit_share(direction) > 0.5,
             Self::Ellipsoid(ellipsoid) => ellipsoid.is_visible(azimuth_rad),
         }
     }
@@ -166,8 +166,9 @@ impl<'a> ProjectedLimb<'a> {
     }
 
     fn project_visible(&self, azimuth_rad: f64) -> Option<ImagePoint<f64>> {
-        let is_visible = |p: &ImagePoint<f64>| self.scene.shows(&self.camera, *p) && self.outline.is_lit(azimuth_rad);
-        self.project(azimuth_rad).filter(is_visible)
+        let direction = self.outline.ray(azimuth_rad)?;
+        let point = self.camera.project(&direction)?;
+        (self.scene.shows(&self.camera, point) && self.outline.is_lit(azimuth_rad, &direction)).then_some(point)
     }
 
     /// Returns the length of the visible segments, pixels.
@@ -186,18 +187,23 @@ impl<'a> ProjectedLimb<'a> {
         // The loop starts at an invisible azimuth, so that it cuts no segment at azimuth zero. A limb without an
         // invisible azimuth is one segment of a full turn.
         let Some(start) = points.iter().position(Option::is_none) else {
-            return vec![self.measure_segment((0..=steps).map(azimuth).collect())];
+            let turn = points.iter().enumerate().map(|(i, point)| (azimuth(i), *point));
+            return vec![measure_segment(turn.chain([(azimuth(steps), points.first().copied().flatten())]))];
         };
         let mut segments = Vec::new();
-        let mut current: Vec<f64> = Vec::new();
+        let mut current: Vec<(f64, Option<ImagePoint<f64>>)> = Vec::new();
+        let end = |visible: f64, hidden: f64| {
+            let azimuth_rad = self.bisect_end(visible, hidden);
+            (azimuth_rad, self.project(azimuth_rad))
+        };
         for i in start..start + steps {
             let (here, next) = (points[i % steps], points[(i + 1) % steps]);
             match (here, next) {
-                (None, Some(_)) => current.extend([self.bisect_end(azimuth(i + 1), azimuth(i)), azimuth(i + 1)]),
-                (Some(_), Some(_)) => current.push(azimuth(i + 1)),
+                (None, Some(_)) => current.extend([end(azimuth(i + 1), azimuth(i)), (azimuth(i + 1), next)]),
+                (Some(_), Some(_)) => current.push((azimuth(i + 1), next)),
                 (Some(_), None) => {
-                    current.push(self.bisect_end(azimuth(i), azimuth(i + 1)));
-                    segments.push(self.measure_segment(core::mem::take(&mut current)));
+                    current.push(end(azimuth(i), azimuth(i + 1)));
+                    segments.push(measure_segment(core::mem::take(&mut current)));
                 }
                 (None, None) => {}
             }
@@ -238,18 +244,19 @@ impl<'a> ProjectedLimb<'a> {
         }
         visible
     }
+}
 
-    fn measure_segment(&self, azimuths_rad: Vec<f64>) -> Segment {
-        let mut last: Option<ImagePoint<f64>> = None;
-        let mut arc = 0.0;
-        let samples = azimuths_rad.into_iter().filter_map(|a| {
-            let p = self.project(a)?;
-            arc += last.map_or(0.0, |l| libm::hypot(p.u - l.u, p.v - l.v));
-            last = Some(p);
-            Some((a, arc))
-        });
-        Segment { samples: samples.collect() }
-    }
+/// Sums the arc length over points by rising azimuth.
+fn measure_segment(points: impl IntoIterator<Item = (f64, Option<ImagePoint<f64>>)>) -> Segment {
+    let mut last: Option<ImagePoint<f64>> = None;
+    let mut arc = 0.0;
+    let samples = points.into_iter().filter_map(|(azimuth_rad, point)| {
+        let p = point?;
+        arc += last.map_or(0.0, |l| libm::hypot(p.u - l.u, p.v - l.v));
+        last = Some(p);
+        Some((azimuth_rad, arc))
+    });
+    Segment { samples: samples.collect() }
 }
 
 impl Scene {

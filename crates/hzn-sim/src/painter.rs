@@ -102,19 +102,17 @@ impl Painter {
         self.height.height_m(self.to_camera(ecef).map_or(0.0, lat))
     }
 
-    /// Returns the share of light that falls where this ray (ECEF, unit) meets or passes the body, 0 to 1.
-    pub(crate) fn lit_share(&self, ecef: [f64; 3]) -> f32 {
-        self.to_camera(ecef).map_or(0.0, |cam| {
-            let hit = self.view.intersect(cam.xyz());
-            let point = self.view.point(&hit);
-            match (&self.air, &self.light) {
-                (Some(air), PreparedLight::Sun { direction, .. }) => {
-                    let mu0 = self.view.normal(&point).dot(direction) as f32;
-                    air.sunlight(air.sun_path(mu0), air.density_ratio(self.height.reference_m as f32))[1]
-                }
-                _ => self.light.share(&self.view, &hit, &point),
+    /// Returns the share of light that falls where this ray meets or passes the body, 0 to 1.
+    pub(crate) fn lit_share(&self, ray: &UnitVec3<Cam, f64>) -> f32 {
+        let hit = self.view.intersect(ray.xyz());
+        let point = self.view.point(&hit);
+        match (&self.air, &self.light) {
+            (Some(air), PreparedLight::Sun { direction, .. }) => {
+                let mu0 = self.view.normal(&point).dot(direction) as f32;
+                air.sunlight(air.sun_path(mu0), air.density_ratio(self.height.reference_m as f32))[1]
             }
-        })
+            _ => self.light.share(&self.view, &hit, &point),
+        }
     }
 
     /// Returns the same scene from another pose.

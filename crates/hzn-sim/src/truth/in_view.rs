@@ -33,19 +33,24 @@ impl Scene {
     /// # Errors
     /// Fails like [`Scene::body_truth`].
     pub fn has_limb(&self, kind: Kind) -> Result<bool, SceneError> {
-        let (visible_px, outline_px) = match self.sky_disc(kind)? {
+        match self.sky_disc(kind)? {
             Some(disc) => {
                 let outline = SkyOutline::try_new(self, kind, &disc)?;
-                (outline.visible_px(), outline_px(|azimuth_rad| outline.project(azimuth_rad)))
+                Ok(self.is_enough(outline.visible_px(), |azimuth_rad| outline.project(azimuth_rad)))
             }
             None => {
                 let limb = ProjectedLimb::try_new(self)?;
-                (limb.visible_px(), outline_px(|azimuth_rad| limb.project(azimuth_rad)))
+                Ok(self.is_enough(limb.visible_px(), |azimuth_rad| limb.project(azimuth_rad)))
             }
-        };
+        }
+    }
+
+    /// Returns whether this length of a visible limb is enough. `project` gives the outline by azimuth.
+    fn is_enough(&self, visible_px: f64, project: impl Fn(f64) -> Option<ImagePoint<f64>>) -> bool {
         let side_px = f64::from(self.camera.width.min(self.camera.height));
-        let enough_px = LIMB_IN_VIEW_PX.min(OUTLINE_SHARE * outline_px).min(SIDE_SHARE * side_px);
-        Ok(visible_px > 0.0 && visible_px >= enough_px)
+        // The whole outline costs as much as the visible part, and only a short one is measured.
+        visible_px >= LIMB_IN_VIEW_PX.min(SIDE_SHARE * side_px)
+            || visible_px > 0.0 && visible_px >= OUTLINE_SHARE * outline_px(project)
     }
 
     /// Returns the length in pixels of the limb that is in the picture, lit and not hidden. `kind` selects the scene's
