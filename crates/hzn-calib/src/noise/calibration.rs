@@ -12,15 +12,18 @@ use super::lag;
 use super::latitude::{Profile, fit_profile};
 use super::refusal::Refusal;
 use super::sighting::Sighting;
+use super::slow;
 use crate::limb_prior::{LimbPrior, TWO_SIDED, has_air};
 
 /// Smallest number of pictures with an answer. With fewer pictures the scatter is not known to a quarter.
 pub const MIN_PICTURES: usize = 12;
 /// 1-sigma that a sensor assumes for an unmeasured limb, in kilometres. A height that is less certain is no gain.
 const DEFAULT_SIGMA_KM: f64 = 2.0 * MAX_SIGMA_KM;
-/// Floor of the common shift of an edge, in pixels: the default of `covariance.sigma_px`. Blur and threshold move the
-/// middle of an edge by fractions of a pixel, even if the edge is smooth.
+/// Floor of the slow part of the errors along an edge and thus of its common shift, in pixels: the default of
+/// `covariance.sigma_px`. Blur and threshold move the middle of an edge by fractions of a pixel, even if it is smooth.
 const MIN_SHIFT_PX: f64 = 0.1;
+/// Value of a tilt at the ends of an edge if its RMS along the edge is 1: √3.
+const TILT_END_PER_RMS: f64 = 1.732_050_807_568_877_2;
 /// Largest distance of a picture's limb height from the median of all, in sigmas. A picture farther away has another
 /// edge and is excluded.
 const MAX_DEVIATION_SIGMAS: f64 = 6.0;
@@ -57,8 +60,8 @@ pub struct Height {
     pub statistical_km: f64,
     /// Part from the scatter between pictures that edge noise does not explain.
     pub scatter_km: f64,
-    /// Part from a shift of all edges by the residuals' RMS, or by 0.1 px if that is larger. Threshold and blur cause
-    /// it, and it is the same in every picture.
+    /// Part from a shift of all edges by the slow part of the residuals, or by 0.1 px if that is larger. Threshold and
+    /// blur cause it, and it is the same in every picture.
     pub shift_km: f64,
     /// Part from a bend that all edges have in common, which the fit takes for another height. It is assumed to be as
     /// strong as the next shapes along the edge in the mean of the residuals.
@@ -99,15 +102,16 @@ pub struct Edge {
     pub length_px: f64,
     /// White part ν of the variance in that model.
     pub white: f64,
-    /// 1-sigma of the part of the errors that averages out over [`Self::slow_px`], in pixels: the white part, and most
-    /// of errors whose length is much shorter.
+    /// 1-sigma of the part of the errors that averages out over [`Self::slow_px`], in pixels: all but the slow part.
     pub white_px: f64,
-    /// Correlation length of the rest, in pixels: L, and at least the length that the sensor assumes without a
+    /// Correlation length of the slow part, in pixels: L, and at least the length that the sensor assumes without a
     /// calibration.
     pub slow_px: f64,
-    /// 1-sigma of a common shift of all points of an edge, in pixels: the RMS of the correlated part of the residuals,
-    /// at least 0.1.
+    /// 1-sigma of a common shift of all points of an edge, in pixels: the RMS of the slow part, at least 0.1.
     pub bias_px: f64,
+    /// 1-sigma of a common tilt of an edge at its ends, in pixels. The fit takes a tilt for another direction, so that
+    /// the residuals do not show it; its RMS is assumed to be that of the shift.
+    pub tilt_px: f64,
 }
 
 /// The focal length that the flight measures. It is reported but never applied.
@@ -247,6 +251,7 @@ impl Calibration {
             correlation_px: round_to_written_digits(self.edge.slow_px),
             white_px: round_to_written_digits(self.edge.white_px),
             bias_px: round_to_written_digits(self.edge.bias_px),
+            tilt_px: round_to_written_digits(self.edge.tilt_px),
             ..sensor.covariance
         };
         let Some(body) = sensor.each_body_mut().iter_mut().find(|b| b.kind == self.body) else { return };
@@ -295,11 +300,9 @@ fn combine_heights(profile: &Profile, sightings: &[&Sighting], edge: &Edge) -> H
         .sum();
     let mean_square = |value: &dyn Fn(&Sighting) -> f64| sightings.iter().map(|s| value(s).powi(2)).sum::<f64>() / n;
     let (statistical_km, scatter_km) = (mean_variance.sqrt(), scatter2.sqrt());
-    // Noise that is new at every point averages out along an edge; only the rest can be a shift.
-    let correlated = (1.0 - (edge.white_px / edge.sigma_px).powi(2)).max(0.0).sqrt();
-    let shift_km = mean_square(&|s| (s.rms_px * correlated).max(MIN_SHIFT_PX) * s.km_per_px).sqrt();
-    let common_px = (mean_square(&|s| s.rms_px).sqrt() * correlated).max(MIN_SHIFT_PX);
-    let bend_px = bend::common_bend_px(sightings.iter().map(|s| &s.shapes_px), common_px);
+    // Noise that is new at every point averages out along an edge; only the slow part can be a shift.
+    let shift_km = edge.bias_px * mean_square(&|s| s.km_per_px).sqrt();
+    let bend_px = bend::common_bend_px(sightings.iter().map(|s| &s.shapes_px), edge.bias_px);
     let bend_km = bend_px * mean_square(&|s| s.km_per_bend_px).sqrt();
     let radius_km = mean_square(&|s| s.radius_sigma_km).sqrt();
     // The lens is the same in all pictures, so that its modes change the mean height and average out in nothing.
@@ -323,7 +326,8 @@ fn combine_heights(profile: &Profile, sightings: &[&Sighting], edge: &Edge) -> H
     }
 }
 
-/// Computes sigma and length, and the most likely (L, ν) of all pictures together, each picture with its own σ.
+/// Computes sigma and length, the slow part, and the most likely (L, ν) of all pictures together, each picture with its
+/// own σ.
 fn combine_edges(sightings: &[&Sighting]) -> Edge {
     let n = sightings.len() as f64;
     let cost = |i: usize, j: usize| sightings.iter().map(|s| s.scores[i][j].minus_two_ln_likelihood).sum::<f64>();
@@ -331,16 +335,16 @@ fn combine_edges(sightings: &[&Sighting]) -> Edge {
     let (i, j) = models.min_by(|a, b| cost(a.0, a.1).total_cmp(&cost(b.0, b.1))).unwrap_or_default();
     let rms_px = (sightings.iter().map(|s| s.rms_px * s.rms_px).sum::<f64>() / n).sqrt();
     let arc_px = sightings.iter().map(|s| s.arc_px).sum::<f64>() / n;
-    let window_px = edge::window_px(arc_px);
-    let correlated = edge::correlated_share((LENGTHS_PX[i], WHITE[j]), window_px);
+    let bias_px = slow::sigma_px(sightings.iter().map(|s| s.slow_px2), rms_px).max(MIN_SHIFT_PX);
     Edge {
         sigma_px: rms_px.max(MIN_SIGMA_PX),
         correlation_px: median(sightings.iter().map(|s| s.correlation_px)),
         length_px: LENGTHS_PX[i],
         white: WHITE[j],
-        slow_px: LENGTHS_PX[i].max(window_px),
-        white_px: rms_px * (1.0 - correlated).sqrt(),
-        bias_px: (rms_px * correlated.sqrt()).max(MIN_SHIFT_PX),
+        slow_px: LENGTHS_PX[i].max(edge::window_px(arc_px)),
+        white_px: (rms_px * rms_px - bias_px * bias_px).max(0.0).sqrt(),
+        bias_px,
+        tilt_px: bias_px * TILT_END_PER_RMS,
     }
 }
 

@@ -101,23 +101,6 @@ pub(crate) fn window_px(arc_px: f64) -> f64 {
     measured.measured(1.0, arc_px).correlation_px
 }
 
-/// Returns the part of the variance of a model (L, ν) that stays in the mean over a window.
-pub(crate) fn correlated_share((length_px, white): (f64, f64), window_px: f64) -> f64 {
-    // The variance of the mean over x correlation lengths, for a Gauss-Markov process of variance 1.
-    let x = window_px / length_px;
-    let share = if x < 1e-3 { 1.0 } else { 2.0 * (x - 1.0 + (-x).exp()) / (x * x) };
-    (1.0 - white) * share
-}
-
-/// Returns the RMS of the correlated part of a picture's residuals, in pixels, for its most likely model.
-pub(crate) fn correlated_px(cone: &Cone, scores: &Scores) -> f64 {
-    let each = scores.iter().zip(LENGTHS_PX).flat_map(|(scores, length)| {
-        scores.iter().zip(WHITE).map(move |(score, white)| (score.minus_two_ln_likelihood, (length, white)))
-    });
-    let likeliest = each.min_by(|a, b| a.0.total_cmp(&b.0)).map_or((LENGTHS_PX[0], 0.0), |(_, model)| model);
-    cone.rms_px() * correlated_share(likeliest, window_px(cone.arc_px())).sqrt()
-}
-
 /// Returns the shortest correlation length, in pixels, at which an exponential process with `sigma_px` gives the fitted
 /// cos α at least this `variance`. If no length does, the result is the length with the largest variance.
 pub(crate) fn equivalent_length_px(cone: &Cone, sigma_px: f64, variance: f64) -> f64 {

@@ -21,6 +21,7 @@ mod latitude;
 mod points;
 mod refusal;
 pub(crate) mod sighting;
+pub(crate) mod slow;
 #[cfg(test)]
 pub(crate) mod tests;
 mod words;

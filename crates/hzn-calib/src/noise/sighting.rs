@@ -14,6 +14,7 @@ use super::bend::{self, SHAPES};
 use super::cone::{Azimuth, Cone, Row, basis};
 use super::edge::{self, Scores};
 use super::lag::Lags;
+use super::slow;
 
 /// Attitudes with a larger sigma, in radians (30 degrees), are not used: they do not show which part of the limb is
 /// visible.
@@ -59,6 +60,8 @@ pub struct Sighting {
     pub latitudes: Vec<(f64, f64)>,
     /// Amplitude of each next shape in the residuals, in pixels.
     pub(super) shapes_px: [f64; SHAPES],
+    /// Variance of the slow part of the residuals, in px²; only its mean over many pictures is an estimate.
+    pub(super) slow_px2: f64,
     /// Scores of the edge noise models for the residuals.
     pub(super) scores: Scores,
     /// Products of residuals by their distance along the edge.
@@ -131,6 +134,7 @@ impl Sighting {
             km_per_px: by_cos_m.abs() * cone.cos_per_px().max(cone.change_of_cos(|_| 1.0).abs()) / 1e3,
             km_per_bend_px: by_cos_m.abs() * cone.change_of_cos(|row| bend::bend_shape(row.along)).abs() / 1e3,
             shapes_px: bend::shapes_px(&cone),
+            slow_px2: slow::variance_px2(&cone),
             km_per_focal: by_lens_km(&|row| row.by_focal_px),
             km_by_lens: core::array::from_fn(|k| by_lens_km(&|row| row.by_lens_px[k])),
             rms_px: cone.rms_px(),

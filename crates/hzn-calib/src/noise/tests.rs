@@ -14,7 +14,7 @@ use crate::draws::Draws;
 #[derive(Clone, Copy)]
 pub(crate) struct Noise(pub(crate) f64, pub(crate) f64, pub(crate) f64);
 
-fn camera(fov_deg: f64) -> camera::Config {
+pub(super) fn camera(fov_deg: f64) -> camera::Config {
     camera::Config::ideal(Model::Equidistant, 960, 720, 960.0 / fov_deg.to_radians())
 }
 
@@ -134,10 +134,12 @@ fn height_scatter_and_noise_are_found_within_their_errors() {
     // (1 − ν) L or more, because one picture does not determine the length.
     assert!((15.0..=200.0).contains(&c.edge.correlation_px), "{:?}", c.edge);
     assert!(c.correlation.first().is_some_and(|p| (p.1 - 1.0).abs() < 1e-9));
-    // What averages out, and the rest, are the whole variance; the rest is the smaller part of such errors.
+    // What averages out, and the slow part, are the whole variance; the slow part is the smaller one of such errors.
     let (whole, slow) = (c.edge.sigma_px.powi(2), c.edge.sigma_px.powi(2) - c.edge.white_px.powi(2));
     assert!((0.05..0.5).contains(&(slow / whole)) && c.edge.bias_px >= slow.sqrt() - 1e-12, "{:?}", c.edge);
     assert!(c.edge.slow_px >= c.edge.length_px, "{:?}", c.edge);
+    // The residuals show no tilt of the whole edge: its RMS is that of the shift.
+    assert!((c.edge.tilt_px / c.edge.bias_px - 3f64.sqrt()).abs() < 1e-9, "{:?}", c.edge);
 }
 
 #[test]

@@ -24,7 +24,13 @@ pub fn lines(calibration: &Calibration, pictures: &str, camera: &Config) -> Vec<
         ("limb height", format!("{:.2} km ± {:.2} km", h.km, h.sigma_km)),
         ("", format!("{:.2} km from edge noise over all pictures", h.statistical_km)),
         ("", format!("{:.2} km of scatter between pictures beyond it", h.scatter_km)),
-        ("", format!("{:.2} km for a common shift of all edges by their correlated RMS, at least 0.1 px", h.shift_km)),
+        (
+            "",
+            format!(
+                "{:.2} km for a common shift of all edges by the slow part of their errors, at least 0.1 px",
+                h.shift_km
+            ),
+        ),
         ("", format!("{:.2} km for a bend that all edges share", h.bend_km)),
     ];
     if h.lens_km > 0.0 {

@@ -99,7 +99,7 @@ fn limb_lines(calibration: &Calibration, source: &str) -> Vec<Line> {
     let mut parts = vec![
         format!("{:.2} km from edge noise over all pictures", h.statistical_km),
         format!("{:.2} km from the scatter between them", h.scatter_km),
-        format!("{:.2} km from a shift of all edges by their correlated RMS, at least 0.1 px", h.shift_km),
+        format!("{:.2} km from a shift of all edges by the slow part of their errors, at least 0.1 px", h.shift_km),
         format!("{:.2} km from a bend that all edges have in common", h.bend_km),
     ];
     if h.lens_km > 0.0 {
@@ -136,7 +136,7 @@ fn limb_lines(calibration: &Calibration, source: &str) -> Vec<Line> {
 
 fn noise_lines(calibration: &Calibration) -> Vec<Line> {
     let e = &calibration.edge;
-    let length = "correlation length of the residuals without their white part".to_owned();
+    let length = "correlation length of the slow part of the residuals".to_owned();
     vec![
         Line {
             key: "sigma_px",
@@ -153,8 +153,13 @@ fn noise_lines(calibration: &Calibration) -> Vec<Line> {
             key: "bias_px",
             value: round_to_written_digits(e.bias_px).into(),
             why: "residuals do not show a common shift of all points; it is assumed to be equal to the RMS of their \
-                  correlated part, and at least 0.1 px"
+                  slow part, and at least 0.1 px"
                 .into(),
+        },
+        Line {
+            key: "tilt_px",
+            value: round_to_written_digits(e.tilt_px).into(),
+            why: "residuals do not show a common tilt either; its RMS is assumed to be that of the shift".into(),
         },
     ]
 }

@@ -13,6 +13,7 @@ use super::view::View;
 use crate::limb_prior::{LimbPrior, unmeasured};
 use crate::noise::bend::common_bend_px;
 use crate::noise::sighting::Geometry;
+use crate::noise::slow;
 
 /// Smallest number of pictures from which the scatter of the limb height is measured. With fewer pictures it is not
 /// known to a quarter, and the 1-sigma of the limb height stands for it.
@@ -300,14 +301,15 @@ fn by_latitude<'a>(pictures: impl Iterator<Item = &'a Geometry>) -> Vec<[f64; LA
 fn common_sigmas_px(layout: Layout, pictures: &[&Fitted]) -> Vec<f64> {
     let n = pictures.len().max(1) as f64;
     let rms_of = |px: &dyn Fn(&Fitted) -> f64| (pictures.iter().map(|p| px(p).powi(2)).sum::<f64>() / n).sqrt();
-    let common_px = rms_of(&|p| p.noise.correlated_px).max(MIN_SHIFT_PX);
+    let rms_px = rms_of(&|p| p.noise.rms_px);
+    let common_px = slow::sigma_px(pictures.iter().map(|p| p.noise.slow_px2), rms_px).max(MIN_SHIFT_PX);
     let mut sigmas = vec![f64::NAN; layout.common()];
     for side in 0..layout.sides {
         let of_side: Vec<_> = pictures.iter().filter(|p| layout.sides == 1 || p.reduced.side == side).collect();
         let bend = common_bend_px(of_side.iter().map(|p| &p.noise.shapes_px), common_px);
         layout.shapes(side).iter().for_each(|place| sigmas[place - layout.first_common()] = bend);
     }
-    sigmas[0] = rms_of(&|p| p.noise.rms_px).max(MIN_SHIFT_PX);
+    sigmas[0] = rms_px.max(MIN_SHIFT_PX);
     sigmas
 }
 

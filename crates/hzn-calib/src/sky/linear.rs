@@ -26,6 +26,7 @@ use crate::noise::bend::{SHAPES, shapes_px};
 use crate::noise::cone::{Azimuth, Cone, basis};
 use crate::noise::edge;
 use crate::noise::sighting::{ATTITUDE_SIGMA_RAD, Geometry, with_useful_attitude};
+use crate::noise::slow;
 
 /// Largest number of iterations for the axis of one picture.
 const ITERATIONS: usize = 10;
@@ -76,8 +77,8 @@ pub(super) struct EdgeNoise {
     pub(super) variance_px2: f64,
     /// RMS of the residuals, in pixels.
     pub(super) rms_px: f64,
-    /// RMS of the correlated part of the residuals, in pixels.
-    pub(super) correlated_px: f64,
+    /// Variance of the slow part of the residuals, in px²; only its mean over many pictures is an estimate.
+    pub(super) slow_px2: f64,
     /// Amplitudes of the next shapes in the residuals, in pixels.
     pub(super) shapes_px: [f64; SHAPES],
 }
@@ -138,7 +139,7 @@ pub(super) fn measure_noise(model: &Model, geometry: &Geometry, view: &View) -> 
     let noise = EdgeNoise {
         variance_px2: (variance / per_px2).max(floor),
         rms_px: cone.rms_px(),
-        correlated_px: edge::correlated_px(&cone, &scores),
+        slow_px2: slow::variance_px2(&cone),
         shapes_px: shapes_px(&cone),
     };
     noise.variance_px2.is_finite().then_some(noise)

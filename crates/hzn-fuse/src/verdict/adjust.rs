@@ -23,23 +23,24 @@ type Columns = Vec<(usize, Vector3<f64>)>;
 
 /// The normal equations at a state.
 struct Normal {
+    /// Only the lower triangle has values: the factor reads no other.
     matrix: DMatrix<f64>,
     gradient: DVector<f64>,
     cost: f64,
 }
 
 impl Normal {
-    /// Adds an error of three numbers with its derivatives, one column for each unknown.
+    /// Adds an error of three numbers with its derivatives: one column for each unknown, and each unknown at most once.
     fn add(&mut self, error: &Vector3<f64>, sigma: f64, is_robust: bool, columns: &[(usize, Vector3<f64>)]) {
         let square = error.norm_squared() / (sigma * sigma);
         let (cost, weight) =
             if is_robust { (CAUCHY * (square / CAUCHY).ln_1p(), 1.0 / (1.0 + square / CAUCHY)) } else { (square, 1.0) };
         self.cost += cost;
         let weight = weight / (sigma * sigma);
-        for (i, a) in columns {
+        for (k, (i, a)) in columns.iter().enumerate() {
             self.gradient[*i] += weight * a.dot(error);
-            for (j, b) in columns {
-                self.matrix[(*i, *j)] += weight * a.dot(b);
+            for (j, b) in columns.iter().take(k + 1) {
+                self.matrix[(*i.max(j), *i.min(j))] += weight * a.dot(b);
             }
         }
     }
