@@ -78,6 +78,11 @@ pub(crate) fn parse_image(schema: &str, message: &[u8]) -> Decoded {
     Decoded { image: parse_pixels(schema, &mut c), header: Some(header) }
 }
 
+/// Reads the stamp of a message that begins with a header, from its first bytes; `None` if the header cannot be read.
+pub(crate) fn parse_stamp(message: &[u8]) -> Option<(i32, u32)> {
+    Cdr::try_new(message)?.header()?.time
+}
+
 /// Reads what follows the header.
 fn parse_pixels(schema: &str, c: &mut Cdr<'_>) -> Result<EncodedImage, String> {
     let short = || SHORT.to_owned();

@@ -56,8 +56,18 @@ impl InputImage {
             _ => Some(log_time_ns),
         };
         let stamp = ns.map(|ns| Stamp::new(ns, &header.frame_id));
-        let before_0 = || header.stamp().map(|(s, ns)| f64::from(s) + f64::from(ns) * 1e-9);
-        Self { time_s: stamp.as_ref().map(Stamp::time_s).or_else(before_0), stamp, image }
+        let has_time = header.time.is_some() || !is_stamped;
+        Self { time_s: has_time.then(|| time_s(header.time, log_time_ns, clock)).flatten(), stamp, image }
+    }
+}
+
+/// Returns the time of a picture in seconds. `stamp` is that of its header, also one of 0; `None` without a header that
+/// has one.
+pub(crate) fn time_s(stamp: Option<(i32, u32)>, log_time_ns: u64, clock: Clock) -> Option<f64> {
+    match stamp {
+        Some((0, 0)) if clock == Clock::Stamps => None,
+        Some((s, ns)) if clock == Clock::Stamps => Some(f64::from(s) + f64::from(ns) * 1e-9),
+        _ => Some(Stamp::new(log_time_ns, "").time_s()),
     }
 }
 

@@ -7,18 +7,22 @@ use std::path::{Path, PathBuf};
 
 use hzn_files::FrameData;
 
+use crate::cdr;
 use crate::container::{
     Channel, Chunk, ChunkFault, Fields, Inflation, MAGIC, MAX_RECORD_BYTES, Message, Op, Record, Schemas,
 };
 use crate::error::Error;
 use crate::frame::CandidateEdge;
-use crate::images::decoder;
+use crate::images::{Clock, ImageReader, decoder};
 use crate::messages;
 use crate::pictures::{Pictures, Place, next_record};
 use crate::row::Row;
 use crate::summary::{self, fill};
 use crate::topics::Topic;
 use crate::writer::SENSOR_TOML;
+
+/// Largest part of a message that is read for its stamp: a header and the name of its frame.
+const MAX_HEADER_BYTES: u64 = 1024;
 
 /// An entry of the index. Entries are in the order of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,7 +34,8 @@ pub enum IndexEntry {
 }
 
 /// Goes through a recording without reading its uncompressed pictures. The recording may be one of hzn, or one of any
-/// writer with pictures that [`crate::ImageReader`] can read. Only pictures of the first topic with pictures are found.
+/// writer with pictures that [`crate::ImageReader`] can read. Only the pictures on the topic of the first one are
+/// found, as by that reader.
 /// In a file that was cut off everything complete is found; [`Index::is_complete`] then returns `false`.
 #[derive(Debug)]
 pub struct Index {
@@ -41,6 +46,8 @@ pub struct Index {
     schemas: Schemas,
     /// Channels with pictures.
     pictures: BTreeMap<u16, Channel>,
+    /// The topic of the first picture.
+    topic: Option<String>,
     reports: BTreeSet<u16>,
     complete: bool,
     inflation: Inflation,
@@ -68,6 +75,7 @@ impl Index {
             sensor_toml: None,
             schemas: Schemas::default(),
             pictures: BTreeMap::new(),
+            topic: None,
             reports: BTreeSet::new(),
             complete: false,
             inflation: Inflation::default(),
@@ -116,6 +124,16 @@ impl Index {
     /// Returns the number of channels with pictures that were found so far.
     pub fn channels(&self) -> usize {
         self.pictures.len()
+    }
+
+    /// Returns the clock of the pictures that were found so far, which [`crate::ImageReader::clock`] has, too.
+    ///
+    /// # Errors
+    /// The file cannot be opened again.
+    pub fn clock(&self) -> Result<Clock, Error> {
+        let mut images = ImageReader::open(&self.path, self.topic.as_deref())?;
+        images.next().transpose()?;
+        Ok(images.clock().unwrap_or(Clock::Log))
     }
 
     /// Returns the entries of the next part of the file, which may be empty; `None` at the end. If another program
@@ -263,15 +281,19 @@ impl Index {
         }
         let Some(m) = Message::parse(&head) else { return Ok(Ok(false)) };
         let mut data = Vec::new();
-        if self.reports.contains(&m.channel) {
-            (&mut self.file).take(rest).read_to_end(&mut data)?;
-            if data.len() as u64 != rest {
-                return Ok(Ok(false));
-            }
-        } else {
-            self.file.seek_relative(rest as i64)?;
+        // Of a picture, only its stamp is of interest here.
+        let wanted = if self.reports.contains(&m.channel) { rest } else { rest.min(self.header_bytes(m.channel)) };
+        (&mut self.file).take(wanted).read_to_end(&mut data)?;
+        if data.len() as u64 != wanted {
+            return Ok(Ok(false));
         }
+        self.file.seek_relative((rest - wanted) as i64)?;
         Ok(self.add_message(&Message { data: &data, ..m }, chunk, at, found).map(|()| true))
+    }
+
+    /// Returns the number of bytes at the beginning of a message that may have its stamp.
+    fn header_bytes(&self, channel: u16) -> u64 {
+        if self.pictures.get(&channel).is_some_and(|channel| channel.encoding == "cdr") { MAX_HEADER_BYTES } else { 0 }
     }
 
     fn add_message(
@@ -282,7 +304,9 @@ impl Index {
         found: &mut Vec<IndexEntry>,
     ) -> Result<(), Error> {
         let (channel, log_time_ns, sequence) = (m.channel, m.log_time_ns, m.sequence);
-        let place = Place { chunk, message: at, channel, log_time_ns, sequence };
+        let is_stamped = self.header_bytes(channel) > 0;
+        let stamp = if is_stamped { cdr::parse_stamp(m.data) } else { None };
+        let place = Place { chunk, message: at, channel, log_time_ns, sequence, stamp };
         if self.reports.contains(&m.channel) {
             let broken = |e: serde_json::Error| Error::Decode {
                 path: self.path.clone(),
@@ -290,7 +314,9 @@ impl Index {
             };
             let (row, candidates, prior) = messages::parse_report(m.data).map_err(broken)?;
             found.push(IndexEntry::Report(place, Box::new(row), candidates, Box::new(prior)));
-        } else if self.pictures.contains_key(&m.channel) {
+        } else if let Some(channel) = self.pictures.get(&m.channel)
+            && *self.topic.get_or_insert_with(|| channel.topic.clone()) == channel.topic
+        {
             found.push(IndexEntry::Picture(place));
         }
         Ok(())
@@ -310,9 +336,7 @@ impl Index {
         if let Some((id, channel)) = self.schemas.declare(op, content) {
             if Topic::of(&channel) == Some(Topic::Report) {
                 self.reports.insert(id);
-            } else if decoder(&channel.schema, &channel.encoding).is_some()
-                && self.pictures.values().all(|first| first.topic == channel.topic)
-            {
+            } else if decoder(&channel.schema, &channel.encoding).is_some() {
                 self.pictures.insert(id, channel);
             }
         }

@@ -8,8 +8,7 @@ use std::path::PathBuf;
 use crate::container::{Channel, Chunk, Fields, Inflation, MAX_RECORD_BYTES, Message, Record};
 use crate::error::Error;
 use crate::header::Decoded;
-use crate::images::{Clock, InputImage, decoder};
-use crate::stamp::Stamp;
+use crate::images::{Clock, InputImage, decoder, time_s};
 use crate::summary::fill;
 
 /// The place of one picture in the file.
@@ -25,6 +24,8 @@ pub struct Place {
     pub(crate) log_time_ns: u64,
     /// Sequence number.
     pub(crate) sequence: u32,
+    /// The stamp of a picture of ROS 2, also one of 0; `None` for other messages, and if the header cannot be read.
+    pub(crate) stamp: Option<(i32, u32)>,
 }
 
 impl Place {
@@ -37,9 +38,10 @@ impl Place {
     pub fn frame(&self) -> (u64, u32) {
         (self.log_time_ns, self.sequence)
     }
-    /// Returns the log time in seconds.
-    pub fn log_time_s(&self) -> f64 {
-        Stamp::new(self.log_time_ns, "").time_s()
+    /// Returns the time of the picture in seconds, of the clock of the recording's pictures ([`crate::Index::clock`]).
+    /// It is that of [`InputImage::time_s`].
+    pub fn time_s(&self, clock: Clock) -> Option<f64> {
+        time_s(self.stamp, self.log_time_ns, clock)
     }
 }
 

@@ -7,6 +7,8 @@ use std::path::Path;
 use hzn_mcap::{Clock, ImageReader, InputImage};
 use mcap::records::MessageHeader;
 
+use crate::common::index;
+
 /// Log time of the first message, in nanoseconds.
 const LOG_NS: u64 = 9_000_000_000;
 
@@ -92,6 +94,34 @@ fn pictures_have_the_times_of_one_clock() {
     stamped(&[(5, 0)]);
     let mut reader = ImageReader::open(&path, None).unwrap().with_clock(Some(Clock::LogInsteadOfZeros));
     assert_eq!(reader.next().unwrap().unwrap().time_s, Some(9.0));
+}
+
+#[test]
+fn an_index_has_the_topic_and_the_times_of_the_reader() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.mcap");
+    let other = || ("/rear", image((70, 0), "mono8"));
+    // Stamps, none of them, a stamp before 0, a picture that cannot be decoded, and one without a header.
+    let bad = [image((5, 0), "mono9"), image((7, 0), "mono8")[..9].to_vec()];
+    let [decoded, cut] = bad;
+    for pictures in [
+        vec![image((5, 250_000_000), "mono8"), image((0, 0), "mono8"), image((-2, 500_000_000), "mono8")],
+        vec![image((0, 0), "mono8"); 3],
+        vec![image((0, 0), "mono8"), image((6, 1), "mono8")],
+        vec![decoded, cut],
+    ] {
+        for others_first in [false, true] {
+            let own = pictures.iter().flat_map(|picture| [("/front", picture.clone()), other()]);
+            let messages: Vec<_> = others_first.then(other).into_iter().chain(own).collect();
+            write(&path, &messages);
+            let (images, clock) = read(&path);
+            let (places, _, index) = index(&path);
+            assert_eq!(index.clock().unwrap(), clock.unwrap());
+            let of_index: Vec<_> = places.iter().map(|place| place.time_s(clock.unwrap())).collect();
+            assert_eq!((of_index, places.len()), (times(&images), images.len()));
+            assert_eq!(images.len(), if others_first { pictures.len() + 1 } else { pictures.len() });
+        }
+    }
 }
 
 #[test]

@@ -243,6 +243,7 @@ fn open_recording(path: &Path, request: &Request, events: &EventSender) -> Resul
     let (mut opened, frames) = read_companions(&request, &folder, recorded_sensor);
     opened.title = title(path);
     if let Ok(mut source) = source::open(std::slice::from_ref(&path.to_owned()), None, None) {
+        opened.notes.extend(source.notes());
         complete_sensor(&mut opened, source.as_mut(), frames.as_ref());
     }
     events.send(Event::Opened(Box::new(opened)));
@@ -289,7 +290,7 @@ fn read_parts(
                     let pictures = index.pictures().map_err(|e| e.to_string())?;
                     events.send(Event::Pictures(path.to_owned(), pictures));
                 }
-                joiner.join(part, index.has_reports())
+                joiner.join(part, index)
             }
             Ok(None) if follow && !index.is_complete() => {
                 std::thread::sleep(LOOK_EVERY);
