@@ -100,6 +100,10 @@ mod tests {
         );
         assert!(error("[captures]\nframes = 1\n").contains("did you mean capture?"));
         assert!(error("[capture]\nframes = \"many\"\n").starts_with("scene.toml:10: [capture] frames: "));
+        let above = |line: &str| read(&format!("{line}\n{CAMERA}")).unwrap_err();
+        assert_eq!(above("capture = []"), "scene.toml:1: capture: is a list; a table is expected");
+        assert_eq!(above("capture = 3"), "scene.toml:1: capture: is a number; a table is expected");
+        assert!(error("[capture]\nframes = {}\n").contains("[capture] frames: is a table: must be a whole number"));
         assert_eq!(error(""), "scene.toml: capture: the section [capture] is missing");
         // serde alone would read the first four numbers.
         for mount in ["[attitude_mount]\n", "[[cameras]]\nmount."] {

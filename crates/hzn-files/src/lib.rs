@@ -38,6 +38,7 @@ pub mod rig;
 pub mod rotations;
 pub mod sensor;
 mod separator;
+pub mod shapes;
 pub mod start;
 pub mod template;
 pub mod time;

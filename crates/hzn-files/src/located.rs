@@ -169,7 +169,9 @@ pub(crate) fn translate_serde_error(
             _ => valid,
         };
         let what = if field.is_empty() || place.is_some_and(|p| p.path.len() == 1) { "section or key" } else { "key" };
-        Problem::new(path, format!("unknown {what}{}", suggestion(first, &valid))).in_field(field)
+        let of_sections = place.filter(|p| p.path.len() == 1).and_then(|_| sections_with(first, &valid));
+        let hint = of_sections.unwrap_or_else(|| suggestion(first, &valid));
+        Problem::new(path, format!("unknown {what}{hint}")).in_field(field)
     } else if message.starts_with("unknown variant") {
         let what = format!("{first:?} is not a valid value{}", suggestion(first, &valid));
         Problem::new(path, what).in_field(field)
@@ -185,16 +187,25 @@ pub(crate) fn translate_serde_error(
         };
         Problem::new(path, what).in_field(field_name(&p))
     } else {
-        let what = explain_whole_number(message, place).unwrap_or_else(|| {
-            message
-                .replace("expected f64", "expected a number")
-                .replace("floating point `", "number `")
-                .replace('\n', "; ")
-        });
-        let problem = Problem::new(path, what);
+        let what = explain_whole_number(message, place).or_else(|| explain_shape(message));
+        let problem = Problem::new(path, what.unwrap_or_else(|| in_words(message)));
         if field.is_empty() { problem } else { problem.in_field(field) }
     };
     attach(problem)
+}
+
+/// Returns serde's message in the words of a file.
+fn in_words(message: &str) -> String {
+    let message = message.replace("expected f64", "expected a number");
+    message.replace("floating point `", "number `").replace('\n', "; ")
+}
+
+/// Says which sections of a sensor.toml have a key that was written above all sections. `valid` are the sections of the
+/// file; `None` if none of them has it.
+fn sections_with(name: &str, valid: &[&str]) -> Option<String> {
+    let own = keys::all().filter(|key| key.name() == name && valid.contains(&key.section()));
+    let sections: Vec<String> = own.map(|key| format!("[{}]", key.section())).collect();
+    (!sections.is_empty()).then(|| format!("; it is a key of {}", sections.join(", ")))
 }
 
 /// Returns the message for a wrong value of a whole-number key, with the limits of that key; `None` for other keys.
@@ -214,8 +225,45 @@ fn explain_whole_number(message: &str, place: Option<&KeyPlace>) -> Option<Strin
     };
     Some(match found.strip_prefix("invalid value: integer `").and_then(|n| n.strip_suffix('`')) {
         Some(number) => format!("{number} is refused: must be {rule}"),
-        None => format!("{}: must be a whole number, {rule}", found.replace("floating point `", "number `")),
+        None => {
+            let found = found.replace("floating point `", "number `");
+            let found = found.replace("invalid type: map", "is a table").replace("invalid type: sequence", "is a list");
+            format!("{found}: must be a whole number, {rule}")
+        }
     })
+}
+
+/// Returns the message for a list or a table where something else belongs, or the other way round, without the terms of
+/// Rust; `None` for other messages.
+fn explain_shape(message: &str) -> Option<String> {
+    if let Some((count, wanted)) = message.strip_prefix("invalid length ").and_then(|m| m.split_once(", expected ")) {
+        return match wanted.strip_prefix("an array of length ") {
+            Some(length) => Some(format!("has {count} values; {length} are expected")),
+            None => wanted.starts_with("struct ").then(|| "is a list; a table is expected".to_owned()),
+        };
+    }
+    let (is, wanted) = message.strip_prefix("invalid type: ")?.split_once(", expected ")?;
+    let is_inner = |word: &str| matches!(word, "map" | "sequence");
+    let belongs = match wanted {
+        "a sequence" => "a list",
+        _ if wanted.starts_with("an array of length ") => "a list",
+        "a map" => "a table",
+        _ if wanted.starts_with("struct ") => "a table",
+        // A number, a text or a flag in place of another one has a message that shows the value.
+        _ if !is_inner(is) => return None,
+        "f64" => "a number",
+        "a boolean" => "true or false",
+        "a string" => "a text",
+        other => other,
+    };
+    let is = match is.split(' ').next().unwrap_or_default() {
+        "map" => "a table",
+        "sequence" => "a list",
+        "integer" | "floating" => "a number",
+        "string" => "a text",
+        _ => "a truth value",
+    };
+    Some(format!("is {is}; {belongs} is expected"))
 }
 
 /// Converts an error of hzn-core, with the place of the value.

@@ -9,7 +9,6 @@ use std::path::Path;
 
 use hzn_core::camera::{self, Camera};
 use hzn_core::error::ConfigError;
-use hzn_core::report::MAX_BODIES;
 use hzn_core::{Config, Preset};
 use serde::Deserialize;
 use toml::de::{DeTable, DeValue};
@@ -23,6 +22,7 @@ use crate::located::{
 use crate::merge::{merge_missing, take};
 use crate::migrate::refuse_old_names;
 use crate::nearest::suggestion;
+use crate::shapes::{check_bodies, refuse_wrong_shape};
 use crate::{Problem, limited, plausible};
 
 /// A sensor.toml that was read and checked.
@@ -62,6 +62,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     // The place of every key, for errors that are found after the table is consumed.
     let places = find_places(table.get_ref());
     refuse_old_names(text, path, &places)?;
+    refuse_wrong_shape(table.get_ref(), text, path)?;
     let preset = match take(table.get_mut(), "preset") {
         None => Preset::default(),
         Some((value, span)) => find_preset(value.as_str().unwrap_or_default())
@@ -105,20 +106,6 @@ pub fn parse(text: &str, path: &Path) -> Result<Sensor, Problem> {
     let mut warnings = of_camera.unwrap_or_default();
     warnings.extend(found.map(|doubt| problem_at_key(doubt.key, doubt.body, doubt.what, text, path, &places)));
     Ok(Sensor { config, text: text.to_owned(), warnings })
-}
-
-/// Refuses `[[bodies]]` together with `[body]`, and too many of them.
-fn check_bodies(table: &DeTable<'_>, text: &str, path: &Path) -> Result<(), Problem> {
-    let Some((key, bodies)) = table.get_key_value("bodies") else { return Ok(()) };
-    let refused = |what: &str| Err(Problem::new(path, what).at_offset(text, key.span().start).in_field("[[bodies]]"));
-    if table.contains_key("body") {
-        return refused("cannot be combined with [body]; write one body as [body], or all bodies as [[bodies]]");
-    }
-    let count = bodies.get_ref().as_array().map_or(0, |bodies| bodies.len());
-    if count > MAX_BODIES {
-        return refused(&format!("{count} are too many; at most {MAX_BODIES} bodies are possible"));
-    }
-    Ok(())
 }
 
 /// Returns the preset of that name, or the reason why it cannot be used.
@@ -277,6 +264,8 @@ mod tests {
             error("[consensus]\nmethod = \"twopoint\"\n"),
             "sensor.toml:10: [consensus] method: \"twopoint\" is not a valid value; did you mean two-point?"
         );
+        let above = parse(&format!("altitude_km = 400\n{CAMERA}"), Path::new("s.toml")).unwrap_err();
+        assert_eq!(above.to_string(), "s.toml:1: altitude_km: unknown section or key; it is a key of [body]");
         let preset = parse(&format!("preset = \"hznn\"\n{CAMERA}"), Path::new("s.toml")).unwrap_err();
         assert_eq!(preset.to_string(), "s.toml:1: preset: no preset \"hznn\"; did you mean hzn?");
         assert_eq!(

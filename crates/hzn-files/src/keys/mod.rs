@@ -122,7 +122,7 @@ fn format_number(x: f64) -> String {
 }
 
 /// Returns the defaults as TOML, by section.
-fn defaults() -> toml::Table {
+pub(crate) fn defaults() -> toml::Table {
     use hzn_core::camera::{Config, Model};
     // In pixels as narrow as those of usual cameras: some defaults are smaller in wider ones.
     let config = hzn_core::Config::new(Config::ideal(Model::default(), 2, 2, 1000.0));
@@ -133,7 +133,7 @@ fn defaults() -> toml::Table {
 }
 
 /// Returns the default of a key as TOML; `None` if it has no default.
-fn default_of(key: &Key, defaults: &toml::Table) -> Option<String> {
+pub(crate) fn default_of(key: &Key, defaults: &toml::Table) -> Option<String> {
     let value = defaults.get(key.section())?.get(key.name())?;
     Some(value.to_string())
 }
