@@ -87,6 +87,51 @@ fn one_size(source: &dyn Source) -> Result<[u32; 2], Error> {
     }
 }
 
+/// The lens that a recording of ROS states beside its pictures.
+#[cfg(feature = "recordings")]
+#[derive(Debug, Clone, PartialEq)]
+pub enum Calibration {
+    /// The text of a sensor.toml with this lens.
+    Known {
+        /// The text.
+        text: String,
+        /// The camera in it.
+        camera: Box<hzn_core::camera::Config>,
+        /// The topic that it comes from.
+        from: String,
+    },
+    /// The recording has a calibration that is not used, for this reason.
+    Unusable(String),
+}
+
+/// Returns the sensor.toml with the calibration that a bag of ROS has beside its pictures; `None` without one, or if
+/// the field of view or the kind of the lens was told.
+///
+/// # Errors
+/// A recording cannot be read, or the calibration is for pictures of another size.
+#[cfg(feature = "recordings")]
+pub fn read_calibration(request: &Request, known: &CameraFacts) -> Result<Option<Calibration>, Error> {
+    if known.fov_deg.is_some() || known.lens.is_some() {
+        return Ok(None);
+    }
+    let found = source::find_camera(&request.inputs, request.topic.as_deref())?;
+    let Some(source::RecordedCamera { from, camera, size_fields }) = found else { return Ok(None) };
+    let camera = match camera {
+        Ok(camera) => camera,
+        Err(what) => return Ok(Some(Calibration::Unusable(format!("{from} is not used: {what}")))),
+    };
+    let ([width, height], (w, h)) = (known.size_px, (camera.width, camera.height));
+    if [w, h].map(u32::from) != known.size_px {
+        return Err(unusable(format!(
+            "{from}: {size_fields} are for pictures of {w} x {h} px, and these are {width} x {height} px: the lens \
+             does not fit. Write the message into a file (ros2 topic echo --once), correct the fields there and read \
+             it with hzn camera convert; or give --fov or --lens, with which the message is not used"
+        )));
+    }
+    let text = start::write_calibrated(known, &camera, &from).map_err(unusable)?;
+    Ok(Some(Calibration::Known { text, camera: Box::new(camera), from }))
+}
+
 /// Finds the field of view from the limb in some pictures, which have the `known` altitude or one in frames.csv.
 ///
 /// # Errors

@@ -10,7 +10,9 @@ use hzn_files::{Problem, plausible};
 use hzn_run::diagnosis::FieldOfView;
 use hzn_run::open::{self, Request};
 use hzn_run::source::{self, Source};
-use hzn_run::start::{Check, LimbSays, check_start, measure_field_of_view, read_camera_facts};
+use hzn_run::start::{
+    Calibration, Check, LimbSays, check_start, measure_field_of_view, read_calibration, read_camera_facts,
+};
 use hzn_run::{disk, explain};
 
 use super::init_rig;
@@ -262,36 +264,24 @@ fn finish(args: &Args, text: &str, known: &CameraFacts) -> Outcome {
 /// Returns the text of the file with the calibration that a bag of ROS has beside its pictures; `None` without one, or
 /// if the command line says what the lens is.
 fn calibrated(args: &Args, known: &CameraFacts) -> Result<Option<String>, Stop> {
-    if args.fov.is_some() || args.lens.is_some() {
-        return Ok(None);
-    }
-    let found = source::find_camera(&args.pictures, args.topic.as_deref())?;
-    let Some(source::RecordedCamera { from, camera, size_fields }) = found else { return Ok(None) };
-    let camera = match camera {
-        Ok(camera) => camera,
-        Err(what) => {
-            tell::warning(format_args!("{from} is not used: {what}"));
-            return Ok(None);
+    match read_calibration(&request(args), known)? {
+        None => Ok(None),
+        Some(Calibration::Unusable(why)) => {
+            tell::warning(why);
+            Ok(None)
         }
-    };
-    let ([width, height], (w, h)) = (known.size_px, (camera.width, camera.height));
-    if [w, h].map(u32::from) != known.size_px {
-        return Err(usage(format!(
-            "{from}: {size_fields} are for pictures of {w} x {h} px, and these are {width} x {height} px: the lens \
-             does not fit. Write the message into a file (ros2 topic echo --once), correct the fields there and read \
-             it with hzn camera convert; or give --fov or --lens, with which the message is not used"
-        )));
+        Some(Calibration::Known { text, camera, from }) => {
+            tell::line(format_args!(
+                "{} written: {} x {} px, {}, f = {:.1} px, from {from}",
+                args.output().display(),
+                camera.width,
+                camera.height,
+                camera.model.name(),
+                camera.fx_px
+            ));
+            Ok(Some(text))
+        }
     }
-    let text = start::write_calibrated(known, &camera, &from).map_err(usage)?;
-    tell::line(format_args!(
-        "{} written: {} x {} px, {}, f = {:.1} px, from {from}",
-        args.output().display(),
-        camera.width,
-        camera.height,
-        camera.model.name(),
-        camera.fx_px
-    ));
-    Ok(Some(text))
 }
 
 /// Returns whether the sensor, or a frames.csv next to the pictures, gives altitudes.

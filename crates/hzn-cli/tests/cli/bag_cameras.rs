@@ -1,5 +1,7 @@
 //! The calibration of a bag's camera, for `hzn init`.
 
+use std::path::Path;
+
 use crate::common::ros::{self, CameraInfo, Logged, compressed_image};
 use crate::common::{Place, limb};
 
@@ -27,6 +29,9 @@ fn picture(topic: &'static str, width: u32) -> Logged<'static> {
 fn calibration<'a>(topic: &'a str, info: &CameraInfo<'_>) -> Logged<'a> {
     (1, topic, "CameraInfo", info.message())
 }
+
+/// Real pictures of a board with 9 × 6 inner corners.
+const BOARDS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/boards");
 
 const FRONT: &str = "/front/image_raw/compressed";
 const FRONT_INFO: &str = "/front/camera_info";
@@ -98,9 +103,21 @@ fn a_start_takes_the_camera_that_was_asked_for() {
     let what = "a.mcap: no pictures on topic /left; there are some on /front/image_raw/compressed, \
                 /rear/image_raw/compressed";
     let board = ["calibrate", "board", "a.mcap", "--board", "9x6", "--square-mm", "20"];
-    for command in [&["init", "a.mcap", "-o", "none.toml"][..], &["run", "a.mcap", "-o", "none.csv"], &board] {
+    place.write("tilt.csv", b"file,accel_x_mps2,accel_y_mps2,accel_z_mps2\na.mcap#000000,0,0,9.8\n");
+    place.write("front.toml", crate::common::SENSOR.as_bytes());
+    let of_board = ["--board", "9x6", "--lens", "front.toml", "--tilt", "tilt.csv"];
+    let mount = [&["calibrate", "mount", "board", "a.mcap"][..], &of_board].concat();
+    let commands = [&["init", "a.mcap", "-o", "none.toml"][..], &["run", "a.mcap", "-o", "none.csv"], &board, &mount];
+    for command in commands {
         place.run(&[command, &["--topic", "/left"]].concat()).expect(2).says(what);
     }
+    // Only the other camera sees a board, which has another size than the lens.
+    let shown = image::open(Path::new(BOARDS).join("left01.jpg")).unwrap().into_luma8();
+    let data = compressed_image((5, 0), "cam", &ros::png(&shown));
+    ros::write(&place.path("a.mcap"), &[picture(FRONT, 320), (1, rear, "CompressedImage", data)]);
+    let rear_size = "the pictures have 640 x 480 px, the lens 320 x 240";
+    place.run(&[&mount[..], &["--topic", rear]].concat()).expect(2).says(rear_size);
+    place.run(&mount).expect(1).says(other).says("no picture shows the board");
     place.run(&["init", "in", "--topic", rear]).expect(2).says("only an MCAP has topics");
     place.run(&["init", "--topic", rear]).expect(2);
     place.run(&["init", "--rig", "in", "in", "--topic", rear]).expect(2).says("--topic");

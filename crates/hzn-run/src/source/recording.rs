@@ -19,6 +19,8 @@ pub(super) struct Recording {
     reader: ImageReader,
     path: PathBuf,
     name: String,
+    /// Whether the topic was told.
+    is_told: bool,
     /// The first picture. It is read early, so that a recording without pictures is refused at once.
     first: Option<Item>,
     index: u64,
@@ -29,7 +31,8 @@ impl Recording {
     pub(super) fn open(path: &Path, topic: Option<&str>, clock: Option<Clock>) -> Result<Self, Error> {
         let reader = ImageReader::open(path, topic).map_err(unusable)?.with_clock(clock);
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        let mut recording = Self { reader, path: path.to_owned(), name, first: None, index: 0 };
+        let mut recording =
+            Self { reader, path: path.to_owned(), name, is_told: topic.is_some(), first: None, index: 0 };
         recording.first = match recording.read() {
             Some(Ok(item)) => Some(item),
             Some(Err(e)) => return Err(unusable(e)),
@@ -134,7 +137,12 @@ impl Source for Recording {
     }
     fn notes(&self) -> Vec<String> {
         let topics: Vec<&str> = self.reader.other_topics().collect();
-        let others = (!topics.is_empty()).then(|| format!("other topics with pictures: {}", topics.join(", ")));
+        // Whoever named the topic knows that there are others.
+        let topic = self.topic().filter(|_| !self.is_told && !topics.is_empty());
+        let others = topic.map(|topic| {
+            let others = topics.join(", ");
+            format!("the pictures are those of {topic}; other topics with pictures: {others} (--topic chooses one)")
+        });
         others.into_iter().chain(describe_clock(&self.reader)).collect()
     }
 }

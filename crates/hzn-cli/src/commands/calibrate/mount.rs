@@ -69,9 +69,12 @@ enum From {
     /// Do not roll the camera by more than 60 degrees between two pictures: near 90 degrees and above, the numbering of
     /// the corners can turn by half a turn, and the mount is then wrong.
     Board {
-        /// Pictures, a folder, or a pattern in quotes
+        /// Pictures, a folder, a pattern in quotes, a video, or an MCAP
         #[arg(required = true, value_name = "PICTURES")]
         input: Vec<PathBuf>,
+        /// Topic of the pictures in an MCAP; without it, the first topic with pictures
+        #[arg(long, value_name = "TOPIC")]
+        topic: Option<String>,
         /// Inner corners of the board, along its rows and its columns: one less than its squares
         #[arg(long, value_name = "COLUMNSxROWS")]
         board: BoardSize,
@@ -126,12 +129,12 @@ pub(super) fn run(args: &Args) -> Outcome {
             output.check(&[file.clone(), told.clone()])?;
             output.write(&of_flight(file, told, &output.name)?)
         }
-        From::Board { input, board, lens, tilt, accel_bias_mg, output } => {
+        From::Board { input, topic, board, lens, tilt, accel_bias_mg, output } => {
             if !(*accel_bias_mg >= 0.0 && accel_bias_mg.is_finite()) {
                 return Err(usage("--accel-bias-mg: must be 0 or more"));
             }
             output.check(&[lens.clone(), tilt.clone()])?;
-            match of_board(input, *board, lens, tilt, *accel_bias_mg)? {
+            match of_board(input, topic.as_deref(), *board, lens, tilt, *accel_bias_mg)? {
                 Some(found) => output.write(&found),
                 None => Ok(Exit::Interrupted),
             }
@@ -247,6 +250,7 @@ const ADVISED_TILT_DEG: f64 = 10.0;
 
 fn of_board(
     input: &[PathBuf],
+    topic: Option<&str>,
     board: BoardSize,
     lens: &Path,
     tilt: &Path,
@@ -257,7 +261,8 @@ fn of_board(
     let camera = &sensor.config.camera;
     let board = Board { columns: board.0[0], rows: board.0[1], square_mm: 1.0 };
     let up = mount_tilts::read(tilt)?;
-    let mut source = hzn_run::source::open(input, None, None)?;
+    let mut source = hzn_run::source::open(input, None, topic)?;
+    source.notes().iter().for_each(|note| tell::line(format_args!("note: {note}")));
     let Some(pictures) = board_search::search(source.as_mut(), &board, None, &stop_flag(), false)? else {
         tell::line("interrupted; nothing was calibrated");
         return Ok(None);
