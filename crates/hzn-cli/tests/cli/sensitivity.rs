@@ -331,3 +331,26 @@ fn the_default_errors_of_a_small_picture_are_doubted() {
     let ratio = predicted / sigmas[sigmas.len() / 2];
     assert!((0.5..2.0).contains(&ratio), "{predicted} of {sigmas:?}");
 }
+
+#[test]
+fn errors_without_a_sensor_are_told_with_what_to_do() {
+    let place = Place::new();
+    let run = |args: &[&str]| place.run(&[&["sensitivity"], args].concat()).expect(0);
+    let assumed = "these errors are assumed, and are those of no camera in particular: edge points 1.00 px, correlated \
+                   over 300 px along the edge; limb height 17 +- 7 km; altitude +- 0.5 km.";
+    let sensor = "-s sensor.toml takes those of a camera (hzn init writes a first one";
+    run(&["--altitude", "400", "--fov", "60"]).says(assumed).says(sensor);
+    run(&["yaw", "--altitude", "400", "--depression", "90"]).says(assumed).says(sensor);
+    // A rig is a design without a file.
+    let rig = run(&["rig", "--altitude", "400"]).says(assumed);
+    assert!(!rig.err.contains("sensor.toml"), "{}", rig.err);
+    // Those of the command line are told as they are, and what is stated needs no word.
+    run(&["--altitude", "400", "--sigma-px", "0.3", "--altitude-sigma", "2"])
+        .says("edge points 0.30 px")
+        .says("+- 2 km. -s");
+    let all = ["--sigma-px", "0.3", "--correlation-px", "9", "--limb-height-sigma", "1", "--altitude-sigma", "2"];
+    let told = run(&[&["--altitude", "400"][..], &all].concat());
+    assert!(!told.err.contains("assumed"), "{}", told.err);
+    let of_sensor = run(&["-s", "in/sensor.toml", "--sigma-px", "0.4", "--altitude", "400"]);
+    assert!(!of_sensor.err.contains("assumed"), "{}", of_sensor.err);
+}

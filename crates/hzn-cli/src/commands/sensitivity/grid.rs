@@ -103,7 +103,8 @@ impl<'a> Grid<'a> {
         self.bodies.get(self.body_number(place)).copied().unwrap_or_else(Body::earth)
     }
 
-    /// Returns the edge noise of each sensor and where it comes from, in words.
+    /// Returns the edge noise of each sensor and where it comes from, in words; or without a sensor the errors that are
+    /// assumed.
     pub(super) fn notes(&self) -> Vec<String> {
         let note = |(one, noise): &(Config, EdgeNoise)| {
             let model = noise_of(one).noise.name();
@@ -114,7 +115,32 @@ impl<'a> Grid<'a> {
                 noise.source
             )
         };
-        self.sensors.iter().map(note).collect()
+        self.sensors.iter().map(note).chain(self.describe_assumed()).collect()
+    }
+
+    /// Describes the errors of a design without a sensor.toml, which are those of no camera in particular; `None` if
+    /// the command line states all of them.
+    fn describe_assumed(&self) -> Option<String> {
+        let args = self.args;
+        let is_told = [args.sigma_px, args.correlation_px, args.limb_height_sigma, args.altitude_sigma];
+        if !self.sensors.is_empty() || is_told.iter().all(Option::is_some) {
+            return None;
+        }
+        let design = self.design(combinations(&self.axes).first()?).ok()?;
+        let sensor = match args.what {
+            What::Rig => "",
+            _ => "-s sensor.toml takes those of a camera (hzn init writes a first one, hzn calibrate measures it); ",
+        };
+        Some(format!(
+            "these errors are assumed, and are those of no camera in particular: edge points {:.2} px, correlated over \
+             {:.0} px along the edge; limb height {} +- {} km; altitude +- {} km. {sensor}--sigma-px, \
+             --correlation-px, --limb-height-sigma and --altitude-sigma state them",
+            design.sigma_px,
+            design.correlation_px,
+            design.limb_height_km,
+            design.limb_height_sigma_km,
+            design.altitude_sigma_km
+        ))
     }
 
     /// Returns the sigmas of a place in the grid; `None` if too little limb is in view.

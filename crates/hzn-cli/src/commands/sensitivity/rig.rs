@@ -38,7 +38,7 @@ pub(super) fn compute(args: &Args) -> Result<Study, Stop> {
     }
     let unseen = results.iter().filter(|(_, s)| s.is_none()).count();
     let note = (unseen > 0).then(|| format!("{unseen} of {} rigs see too little limb for a direction", results.len()));
-    Ok(Study { table, chart: chart(&grid, &results, &swept), notes: note.into_iter().collect() })
+    Ok(Study { table, chart: chart(&grid, &results, &swept), notes: grid.notes().into_iter().chain(note).collect() })
 }
 
 /// Refuses what a rig cannot have.
