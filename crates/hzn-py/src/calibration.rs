@@ -12,6 +12,7 @@ use pyo3::prelude::*;
 use crate::camera::{Camera, rows};
 use crate::errors;
 use crate::image::{Array, View};
+use crate::numbers::Size;
 
 #[doc = doc!("Calibration")]
 #[pyclass(frozen, module = "hzn")]
@@ -115,10 +116,10 @@ pub(crate) fn calibrate(
     py: Python<'_>,
     object_points: Vec<Bound<'_, PyAny>>,
     image_points: Vec<Bound<'_, PyAny>>,
-    size: (u16, u16),
+    size: Size,
     model: &str,
 ) -> PyResult<Calibration> {
-    let model = find_model(model)?;
+    let (model, size) = (find_model(model)?, size.in_u16()?);
     let views = paired(&object_points, &image_points, "object_points")?.map(|(n, place, at)| {
         let columns = if is_three_wide(place)? { 3 } else { 2 };
         let (places, pixels) = (rows_of_points(place, columns, "object_points")?, image_rows(at)?);
@@ -144,10 +145,10 @@ pub(crate) fn calibrate_points(
     py: Python<'_>,
     directions: Vec<Bound<'_, PyAny>>,
     image_points: Vec<Bound<'_, PyAny>>,
-    size: (u16, u16),
+    size: Size,
     model: &str,
 ) -> PyResult<Calibration> {
-    let model = find_model(model)?;
+    let (model, size) = (find_model(model)?, size.in_u16()?);
     let pictures = paired(&directions, &image_points, "directions")?.map(|(n, vectors, at)| {
         let (vectors, pixels) = (rows_of_points(vectors, 3, "directions")?, image_rows(at)?);
         same_length(n, vectors.nrows(), pixels.nrows())?;

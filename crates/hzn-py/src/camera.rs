@@ -11,6 +11,7 @@ use numpy::{AllowTypeChange, PyArray2, PyArray3, PyArrayLike2, PyUntypedArrayMet
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::numbers::Size;
 use crate::{errors, parameters};
 
 #[doc = doc!("Camera")]
@@ -90,22 +91,25 @@ impl Camera {
     fn from_opencv(
         source: &Bound<'_, PyAny>,
         distortion: Option<&Bound<'_, PyAny>>,
-        size: Option<(u16, u16)>,
+        size: Option<Size>,
         fisheye: bool,
     ) -> PyResult<Self> {
         if let Ok(path) = source.extract::<PathBuf>() {
             return Self::from_file(source.py(), &path, None);
         }
-        let matrix = rows(source, 3, "camera matrix")?;
+        let matrix = rows(source, 3, "camera matrix");
+        let matrix = matrix.ok().filter(|matrix| matrix.as_array().nrows() == 3).ok_or_else(|| {
+            let what = "camera matrix: three rows of three numbers are expected: [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]";
+            errors::config(what)
+        })?;
         let m = matrix.as_array();
-        if m.nrows() != 3 {
-            return Err(errors::config("camera matrix: shape (3, 3) is expected"));
-        }
         let rows: [f64; 9] = core::array::from_fn(|i| m[(i / 3, i % 3)]);
         let [fx_px, fy_px, cx_px, cy_px] =
             camera_file::camera_matrix(rows).map_err(|what| errors::config(format!("camera matrix: {what}")))?;
-        let (width, height) =
-            size.ok_or_else(|| errors::config("size: is required with a camera matrix; pass size=(width, height)"))?;
+        let Some(size) = size else {
+            return Err(errors::config("size: is required with a camera matrix; pass size=(width, height)"));
+        };
+        let (width, height) = size.in_u16()?;
         let k: Vec<f64> = match distortion {
             Some(d) => d.py().import("numpy")?.call_method1("ravel", (d,))?.call_method0("tolist")?.extract()?,
             None => Vec::new(),

@@ -6,6 +6,7 @@
 use std::ffi::CString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use hzn_files::Problem;
 use hzn_run::terminal;
 use pyo3::exceptions::{PyRuntimeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
@@ -23,6 +24,11 @@ create_exception!(hzn, ImageError, HznError, "An array that is no picture, or no
 /// Returns the exception for an invalid configuration.
 pub(crate) fn config(what: impl std::fmt::Display) -> PyErr {
     ConfigError::new_err(terminal::lines(what))
+}
+
+/// Returns the exception for a problem in a text that was made here. Nobody sees that text, so its lines say nothing.
+pub(crate) fn unseen(problem: Problem) -> PyErr {
+    config(Problem { line: None, column: None, ..problem })
 }
 
 /// Returns the exception for an invalid picture.

@@ -58,7 +58,7 @@ fn rows(m: &Matrix3<f64>) -> Rows {
 
 fn settings(given: &Bound<'_, PyAny>) -> PyResult<Settings> {
     let text = toml::to_string(&parameters::from_python(given)?).map_err(errors::config)?;
-    hzn_files::document::parse(&text, Path::new("settings"), Settings::check).map_err(errors::config)
+    hzn_files::document::parse(&text, Path::new("settings"), Settings::check).map_err(errors::unseen)
 }
 
 /// Attitude (vehicle to reference) of two directions; None if they are too close.

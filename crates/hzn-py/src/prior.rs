@@ -4,7 +4,7 @@ use hzn_files::FrameData;
 use pyo3::prelude::*;
 
 use crate::errors;
-use crate::numbers::Numbers;
+use crate::numbers::{Numbers, Seconds};
 
 /// The values that are given with a picture, from Python's arguments. A table of pandas has NaN for a gap. NaN, or an
 /// array of NaN, is therefore an unknown value, like an empty cell of a frames.csv.
@@ -29,10 +29,10 @@ impl Prior {
         range_sigma_km: Option<f64>,
         pole: Option<Numbers<3>>,
         sun: Option<Numbers<3>>,
-        time_s: Option<f64>,
+        time_s: Option<Seconds>,
         camera_temperature_c: Option<f64>,
     ) -> PyResult<Self> {
-        let time_s = number(time_s);
+        let time_s = number(time_s.map(|Seconds(time_s)| time_s));
         if time_s.is_some_and(f64::is_infinite) {
             return Err(errors::config("time_s: must be a finite number"));
         }

@@ -10,17 +10,48 @@ use hzn_files::rig::{self, Common, Head, HeadMount, JOINT};
 use hzn_mcap::{Row, RowMeta};
 use hzn_run::engine::{BodyOutcome, Finished, Unprocessed};
 use hzn_run::rig::{Joiner, Memory, Seen};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::errors;
 use crate::numbered::number;
-use crate::numbers::Numbers;
+use crate::numbers::{Numbers, Seconds, class_of};
 use crate::prior::{Prior, utc};
 use crate::read::Read;
 use crate::report::Report;
 use crate::sensor::{Sensor, row_meta};
 use crate::state::State;
+
+/// A list with one item for each head. Heads have names in other places, so a dictionary is a likely mistake.
+struct InOrder<T>(Vec<T>);
+
+impl<'py, T: for<'a> FromPyObject<'a, 'py>> FromPyObject<'_, 'py> for InOrder<T> {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if object.is_instance_of::<PyDict>() {
+            let what = "a list is expected, not dict: give one item for each head, in one order, and names=[...]";
+            return Err(PyTypeError::new_err(what));
+        }
+        object.extract().map(Self)
+    }
+}
+
+/// The pictures of an epoch by the names of their heads.
+struct ByHead<'py>(Bound<'py, PyDict>);
+
+impl<'py> FromPyObject<'_, 'py> for ByHead<'py> {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let wrong = || {
+            let what = "a dict with the picture of each head is expected, for example {\"head0\": image}, not";
+            PyTypeError::new_err(format!("{what} {}", class_of(&object)))
+        };
+        object.cast::<PyDict>().map(|dict| Self(dict.to_owned())).map_err(|_| wrong())
+    }
+}
 
 #[doc = doc!("Rig")]
 #[pyclass(frozen, module = "hzn")]
@@ -40,8 +71,8 @@ impl Rig {
                         rig_sigma_deg = 0.0, limb_tilt_sigma_km = None, limb_own_sigma_km = None, false_alarm = None,
                         misleading = None))]
     fn new(
-        sensors: Vec<Py<Sensor>>,
-        mounts: Vec<Numbers<4>>,
+        sensors: InOrder<Py<Sensor>>,
+        mounts: InOrder<Numbers<4>>,
         names: Option<Vec<String>>,
         limb_groups: Option<Vec<Option<String>>>,
         mount_sigma_deg: f64,
@@ -51,6 +82,7 @@ impl Rig {
         false_alarm: Option<f64>,
         misleading: Option<f64>,
     ) -> PyResult<Self> {
+        let (InOrder(sensors), InOrder(mounts)) = (sensors, mounts);
         let names = names.unwrap_or_else(|| (0..sensors.len()).map(|k| format!("head{k}")).collect());
         let limb_groups = limb_groups.unwrap_or_else(|| vec![None; sensors.len()]);
         for (what, count) in [("mounts", mounts.len()), ("names", names.len()), ("limb_groups", limb_groups.len())] {
@@ -97,14 +129,14 @@ impl Rig {
     fn process<'py>(
         &self,
         py: Python<'py>,
-        images: &Bound<'py, PyDict>,
+        images: ByHead<'py>,
         altitude_km: Option<f64>,
         position_km: Option<Numbers<3>>,
         attitude: Option<Numbers<4>>,
         attitude_sigma_deg: Option<f64>,
         rate_rad_s: Option<Numbers<3>>,
         sun: Option<Numbers<3>>,
-        time_s: Option<f64>,
+        time_s: Option<Seconds>,
         camera_temperature_c: Option<f64>,
         bits: Option<u8>,
     ) -> PyResult<Bound<'py, PyDict>> {
@@ -121,7 +153,7 @@ impl Rig {
             time_s,
             camera_temperature_c,
         )?;
-        let epoch = self.see(py, images, &known, bits, false)?;
+        let epoch = self.see(py, &images.0, &known, bits, false)?;
         let seen: Vec<Seen<'_>> = epoch.frames.iter().map(|frame| Seen::new(frame.as_ref(), None)).collect();
         Self::answers(py, 0, &epoch, &seen)
     }
@@ -157,14 +189,8 @@ impl Rig {
 
     /// Processes the pictures of one epoch of a sequence, in any order and on any thread.
     #[pyo3(name = "_see")]
-    fn see_epoch(
-        &self,
-        py: Python<'_>,
-        images: &Bound<'_, PyDict>,
-        known: &Prior,
-        bits: Option<u8>,
-    ) -> PyResult<RigEpoch> {
-        Ok(RigEpoch(Mutex::new(Some(self.see(py, images, known, bits, true)?))))
+    fn see_epoch(&self, py: Python<'_>, images: ByHead<'_>, known: &Prior, bits: Option<u8>) -> PyResult<RigEpoch> {
+        Ok(RigEpoch(Mutex::new(Some(self.see(py, &images.0, known, bits, true)?))))
     }
 
     /// Joins the answers of the next epoch of a sequence.

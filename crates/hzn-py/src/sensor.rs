@@ -18,7 +18,7 @@ use crate::camera::Camera;
 use crate::expected::Expected;
 use crate::image::{Array, View};
 use crate::mask::Seen;
-use crate::numbers::Numbers;
+use crate::numbers::{Numbers, Seconds, Size};
 use crate::prior::{Prior, utc};
 use crate::read::{Read, Shown};
 use crate::report::Report;
@@ -85,19 +85,21 @@ impl Sensor {
     #[doc = doc!("Sensor.start")]
     #[staticmethod]
     #[pyo3(signature = (pictures = None, *, size = None, fov_deg = None, lens = None, altitude_km = None,
-                        body = "earth", flight = false))]
+                        body = "earth", topic = None, flight = false))]
     fn start(
         py: Python<'_>,
         pictures: Option<start::Pictures>,
-        size: Option<(u32, u32)>,
+        size: Option<Size>,
         fov_deg: Option<f64>,
         lens: Option<&str>,
         altitude_km: Option<f64>,
         body: &str,
+        topic: Option<&str>,
         flight: bool,
     ) -> PyResult<Self> {
-        let pictures = pictures.map(start::Pictures::into_paths).unwrap_or_default();
-        let config = start::make(py, &start::Said { pictures, size, fov_deg, lens, altitude_km, body })?;
+        let pictures = pictures.map(|start::Pictures(paths)| paths).unwrap_or_default();
+        let size = size.map(|Size(width, height)| (width, height));
+        let config = start::make(py, &start::Said { pictures, size, fov_deg, lens, altitude_km, body, topic })?;
         Self::from_config(config, flight)
     }
 
@@ -134,7 +136,7 @@ impl Sensor {
         attitude: Option<Numbers<4>>,
         attitude_sigma_deg: Option<f64>,
         rate_rad_s: Option<Numbers<3>>,
-        time_s: Option<f64>,
+        time_s: Option<Seconds>,
         camera_temperature_c: Option<f64>,
     ) -> PyResult<Expected> {
         let known = Prior::new(
@@ -170,7 +172,7 @@ impl Sensor {
         range_sigma_km: Option<f64>,
         pole: Option<Numbers<3>>,
         sun: Option<Numbers<3>>,
-        time_s: Option<f64>,
+        time_s: Option<Seconds>,
         camera_temperature_c: Option<f64>,
         bits: Option<u8>,
         detail: bool,
@@ -224,10 +226,11 @@ impl Sensor {
     }
 
     #[doc = doc!("Sensor.process_many")]
-    #[pyo3(signature = (images, *, jobs = None, progress = false))]
+    #[pyo3(signature = (images, *, topic = None, jobs = None, progress = false))]
     fn process_many<'py>(
         slf: &Bound<'py, Self>,
         images: &Bound<'py, PyAny>,
+        topic: Option<&str>,
         jobs: Option<usize>,
         progress: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
@@ -235,10 +238,10 @@ impl Sensor {
         let many = slf.py().import("hzn._many")?.getattr("process_many")?;
         // If a picture depends on the previous one, the pictures are processed one after another.
         if !state.config.track.is_on() {
-            return many.call1((slf, images, if state.config.tracks() { Some(1) } else { jobs }, progress));
+            return many.call1((slf, images, topic, if state.config.tracks() { Some(1) } else { jobs }, progress));
         }
         // A sensor of its own, because single pictures that are processed meanwhile are not of the sequence.
-        many.call1((slf.get().for_sequence()?, images, Some(1), progress))
+        many.call1((slf.get().for_sequence()?, images, topic, Some(1), progress))
     }
 
     fn __repr__(&self) -> String {

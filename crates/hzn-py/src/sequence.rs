@@ -15,6 +15,7 @@ use crate::mask::Seen;
 use crate::prior::Prior;
 use crate::report::Report;
 use crate::sensor::Sensor;
+use crate::start::in_python;
 use crate::state::State;
 
 /// Pictures of a folder, a pattern, a video, a recording, or picture files, in order and not yet decoded.
@@ -36,19 +37,20 @@ pub(crate) struct Item {
 #[pymethods]
 impl Sequence {
     #[new]
-    fn new(py: Python<'_>, sensor: &Sensor, inputs: Vec<PathBuf>) -> PyResult<Self> {
+    #[pyo3(signature = (sensor, inputs, topic = None))]
+    fn new(py: Python<'_>, sensor: &Sensor, inputs: Vec<PathBuf>, topic: Option<String>) -> PyResult<Self> {
         let state = sensor.state();
         let opened = errors::detached(py, || {
             let own = hzn_files::Sensor { config: state.config.clone(), text: String::new(), warnings: Vec::new() };
             let sensor = SensorChoice::Ready(Box::new(own));
-            open(&Request { inputs, sensor, flight: state.flight, ..Request::default() }).map_err(errors::run)
+            open(&Request { inputs, sensor, topic, flight: state.flight, ..Request::default() }).map_err(errors::run)
         })??;
         // `hzn run` refuses such a sequence. Here every picture gets its report, which says the same.
         let doubts = [opened.check_size(), opened.check_altitude()];
         let doubts = doubts.into_iter().filter_map(Result::err).map(|e| e.to_string());
         let Opened { source, sensor, frames, warnings, notes } = opened;
         for warning in doubts.chain(warnings).chain(notes) {
-            errors::warn(py, warning)?;
+            errors::warn(py, in_python(&warning))?;
         }
         // The bits and the tone of the pictures.
         let state = if sensor.config == state.config { state } else { state.with_config(sensor.config)? };

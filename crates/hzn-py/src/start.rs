@@ -4,31 +4,33 @@ use std::path::{Path, PathBuf};
 
 use hzn_core::Config;
 use hzn_core::camera::Model;
-use hzn_files::sensor;
 use hzn_files::start::{Body, CameraFacts, write_sensor_toml};
+use hzn_files::{Problem, sensor};
 use hzn_run::open::Request;
 use hzn_run::source;
-use hzn_run::start::{Check, LimbSays, check_start, measure_field_of_view, read_camera_facts};
+use hzn_run::start::{
+    Calibration, Check, LimbSays, check_start, measure_field_of_view, read_calibration, read_camera_facts,
+};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use crate::errors;
+use crate::numbers::class_of;
 
-/// The pictures of a camera, as Python gives them.
-#[derive(FromPyObject)]
-pub(crate) enum Pictures {
-    /// A file, a folder, a pattern, a video or a recording.
-    One(PathBuf),
-    /// Several of them.
-    Many(Vec<PathBuf>),
-}
+/// The pictures of a camera: a file, a folder, a pattern, a video or a recording, or several of them.
+pub(crate) struct Pictures(pub(crate) Vec<PathBuf>);
 
-impl Pictures {
-    /// Returns all paths.
-    pub(crate) fn into_paths(self) -> Vec<PathBuf> {
-        match self {
-            Self::One(path) => vec![path],
-            Self::Many(paths) => paths,
-        }
+impl<'py> FromPyObject<'_, 'py> for Pictures {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let paths = object.extract().map(|path| vec![path]).or_else(|_| object.extract());
+        paths.map(Self).map_err(|_: PyErr| {
+            PyTypeError::new_err(format!(
+                "a path or a list of paths is expected, not {}; for arrays, give size=(width, height) instead",
+                class_of(&object)
+            ))
+        })
     }
 }
 
@@ -40,14 +42,23 @@ pub(crate) struct Said<'a> {
     pub(crate) lens: Option<&'a str>,
     pub(crate) altitude_km: Option<f64>,
     pub(crate) body: &'a str,
+    pub(crate) topic: Option<&'a str>,
 }
 
 /// Returns the parameters that `hzn init` writes for this camera.
 pub(crate) fn make(py: Python<'_>, said: &Said<'_>) -> PyResult<Config> {
-    let mut known = errors::detached(py, || complete(said))??;
+    let (mut known, notes) = errors::detached(py, || read(said))??;
+    notes.iter().try_for_each(|note| errors::warn(py, in_python(note)))?;
+    if let Some(parsed) = calibrated(py, said, &known)? {
+        tell_doubts(py, &known, &parsed.warnings)?;
+        return Ok(parsed.config);
+    }
+    if !said.pictures.is_empty() && !known.has_focal() {
+        errors::detached(py, || add_field_of_view(said, &mut known))??;
+    }
     let write = |known: &CameraFacts| {
         let start = write_sensor_toml(known).map_err(|why| errors::config(in_python(&why)))?;
-        let parsed = sensor::parse(&start.text, Path::new("Sensor.start")).map_err(errors::config)?;
+        let parsed = parse(&start.text, "Sensor.start")?;
         PyResult::Ok((start, parsed))
     };
     let (mut start, mut parsed) = write(&known)?;
@@ -65,24 +76,51 @@ pub(crate) fn make(py: Python<'_>, said: &Said<'_>) -> PyResult<Config> {
         }
     }
     start.warnings.iter().try_for_each(|warning| errors::warn(py, in_python(warning)))?;
-    parsed.warnings.iter().try_for_each(|warning| errors::warn(py, warning))?;
+    tell_doubts(py, &known, &parsed.warnings)?;
+    Ok(parsed.config)
+}
+
+/// Reads the text of a sensor that comes `from` there. Nobody sees the text, so its lines say nothing.
+fn parse(text: &str, from: &str) -> PyResult<hzn_files::Sensor> {
+    let mut parsed = sensor::parse(text, Path::new(from)).map_err(errors::unseen)?;
+    parsed.warnings.iter_mut().for_each(|problem| (problem.line, problem.column) = (None, None));
+    Ok(parsed)
+}
+
+/// Warns of values that look wrong, and of a camera that was turned.
+fn tell_doubts(py: Python<'_>, known: &CameraFacts, warnings: &[Problem]) -> PyResult<()> {
+    warnings.iter().try_for_each(|warning| errors::warn(py, warning))?;
     if known.exif.turned {
         errors::warn(
             py,
             "the camera was turned by 90 degrees (EXIF Orientation): the width is that of the stored picture",
         )?;
     }
-    Ok(parsed.config)
+    Ok(())
+}
+
+/// Returns the sensor with the calibration that a recording has beside its pictures, as `hzn init` writes it.
+fn calibrated(py: Python<'_>, said: &Said<'_>, known: &CameraFacts) -> PyResult<Option<hzn_files::Sensor>> {
+    if said.pictures.is_empty() {
+        return Ok(None);
+    }
+    let request = said.request();
+    let found = errors::detached(py, || read_calibration(&request, known))?;
+    match found.map_err(|e| errors::config(in_python(&e.to_string())))? {
+        None => Ok(None),
+        Some(Calibration::Unusable(why)) => errors::warn(py, in_python(&why)).map(|()| None),
+        Some(Calibration::Known { text, from, .. }) => parse(&text, &from).map(Some),
+    }
 }
 
 impl Said<'_> {
     fn request(&self) -> Request {
-        Request { inputs: self.pictures.clone(), ..Request::default() }
+        Request { inputs: self.pictures.clone(), topic: self.topic.map(str::to_owned), ..Request::default() }
     }
 }
 
-/// Returns what is known about the camera, with the field of view from the limb if nothing else says it.
-fn complete(said: &Said<'_>) -> PyResult<CameraFacts> {
+/// Returns what is known about the camera, and notes about the pictures.
+fn read(said: &Said<'_>) -> PyResult<(CameraFacts, Vec<String>)> {
     let lens = said.lens.map(lens).transpose()?;
     let body = Body::from_name(said.body).ok_or_else(|| {
         let names: Vec<&str> = Body::all().map(Body::name).collect();
@@ -97,19 +135,23 @@ fn complete(said: &Said<'_>) -> PyResult<CameraFacts> {
     if let Some(size) = said.size.filter(|(width, height)| ![width, height].iter().all(|n| (1..=65_535).contains(*n))) {
         return Err(errors::config(format!("size: {size:?} is refused: width and height must be 1 to 65535 pixels")));
     }
-    let read = match (said.pictures.as_slice(), said.size) {
-        ([], Some((width, height))) => CameraFacts::of_size([width, height]),
+    let (read, notes) = match (said.pictures.as_slice(), said.size) {
+        ([], Some(_)) if said.topic.is_some() => {
+            return Err(errors::config("topic: there are no pictures; give the recording with them"));
+        }
+        ([], Some((width, height))) => (CameraFacts::of_size([width, height]), Vec::new()),
         (paths @ [_, ..], None) => {
-            let mut source = source::open(paths, None, None).map_err(errors::image)?;
-            read_camera_facts(source.as_mut()).map_err(errors::image)?
+            let mut source = source::open(paths, None, said.topic).map_err(errors::image)?;
+            (read_camera_facts(source.as_mut()).map_err(errors::image)?, source.notes())
         }
         _ => return Err(errors::config("give either pictures or size=(width, height)")),
     };
-    let mut known = CameraFacts { fov_deg: said.fov_deg, lens, altitude_km: said.altitude_km, body, ..read };
-    if said.pictures.is_empty() || known.has_focal() {
-        return Ok(known);
-    }
-    match measure_field_of_view(&said.request(), &known).map_err(errors::image)? {
+    Ok((CameraFacts { fov_deg: said.fov_deg, lens, altitude_km: said.altitude_km, body, ..read }, notes))
+}
+
+/// Adds the field of view that the limb says.
+fn add_field_of_view(said: &Said<'_>, known: &mut CameraFacts) -> PyResult<()> {
+    match measure_field_of_view(&said.request(), known).map_err(errors::image)? {
         LimbSays::FieldOfView(found) => (known.lens, known.measured) = (Some(found.lens), Some(found.measured)),
         // `write_sensor_toml` says what is missing.
         LimbSays::NoAltitude => {}
@@ -136,7 +178,7 @@ fn complete(said: &Said<'_>) -> PyResult<CameraFacts> {
             )));
         }
     }
-    Ok(known)
+    Ok(())
 }
 
 fn lens(name: &str) -> PyResult<Model> {
@@ -148,7 +190,8 @@ fn lens(name: &str) -> PyResult<Model> {
 }
 
 /// Returns a message of `hzn init` with the names of Python's arguments instead of options.
-fn in_python(message: &str) -> String {
+pub(crate) fn in_python(message: &str) -> String {
+    let message = message.replace("--fov or --lens,", "fov_deg or lens,").replace("--topic chooses", "topic= chooses");
     let named = message.replace("without --fov,", "without fov_deg,").replace("--fov ", "fov_deg=");
     let named = named.replace("--altitude ", "altitude_km=");
     named.replace("--lens fisheye", "lens=\"fisheye\"").replace("--lens pinhole", "lens=\"pinhole\"")

@@ -6,8 +6,9 @@ use hzn_core::image::Layout;
 use hzn_run::source::picture::{Picture, Samples};
 use hzn_sim::{Pose, Scenario, scenario};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
-use crate::numbers::Numbers;
+use crate::numbers::{Numbers, Seconds, class_of};
 use crate::prior::check_attitude;
 use crate::sensor::Sensor;
 use crate::{errors, image, parameters};
@@ -20,11 +21,12 @@ pub(crate) fn render<'py>(
     sensor: &Sensor,
     position_km: Numbers<3>,
     attitude: Numbers<4>,
-    time_s: f64,
+    time_s: Seconds,
     world: Option<&Bound<'py, PyAny>>,
     seed: Option<u64>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (Numbers(position_km), Numbers(attitude)) = (position_km, attitude);
+    let Seconds(time_s) = time_s;
     if !(position_km.iter().all(|x| x.is_finite()) && time_s.is_finite()) {
         return Err(errors::config("position_km and time_s: finite numbers are expected"));
     }
@@ -56,14 +58,16 @@ pub(crate) fn to_numpy<'py>(py: Python<'py>, picture: &hzn_sim::Picture) -> PyRe
 
 /// Reads a scene by its name, from a file, or from a dictionary. A number of pictures and a seed replace its own.
 pub(crate) fn load(scene: &Bound<'_, PyAny>, frames: Option<u32>, seed: Option<u64>) -> PyResult<Scenario> {
-    let scenario = if let Ok(name) = scene.extract::<PathBuf>() {
-        scenario::load(&name.to_string_lossy(), frames, seed)
-    } else {
-        let text = toml::to_string(&parameters::from_python(scene)?).map_err(errors::config)?;
-        // JSON has no dates, but the start time in a scene.toml is a date and not text.
-        scenario::parse(&unquoted_date(&text), Path::new("scene"), frames, seed)
-    };
-    scenario.map_err(errors::config)
+    if let Ok(name) = scene.extract::<PathBuf>() {
+        return scenario::load(&name.to_string_lossy(), frames, seed).map_err(errors::config);
+    }
+    if !scene.is_instance_of::<PyDict>() {
+        let kind = class_of(scene);
+        return Err(errors::config(format!("scene: a name, a path or a dict is expected, not {kind}")));
+    }
+    let text = toml::to_string(&parameters::from_python(scene)?).map_err(errors::config)?;
+    // JSON has no dates, but the start time in a scene.toml is a date and not text.
+    scenario::parse(&unquoted_date(&text), Path::new("scene"), frames, seed).map_err(errors::unseen)
 }
 
 /// Removes the quotes of a line like `utc = "2026-06-21T12:00:00Z"`.

@@ -2,6 +2,8 @@
 
 import csv
 import io
+import itertools
+import json
 import subprocess
 
 import cv2
@@ -91,3 +93,36 @@ def test_the_fitting_field_of_view_is_told_of_a_file(tmp_path):
     wrong = hzn.Sensor(**PARAMETERS | {"body": {"kind": "earth-sphere", "altitude_km": 2000.0}})
     assert wrong.what_fits(path) == wrong.what_fits(limb())
     assert "altitude" in wrong.what_fits(path)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_the_row_of_a_report_is_that_of_the_command(tmp_path, hzn_program):
+    path = tmp_path / "a.png"
+    write("png", path)
+    (tmp_path / "sensor.toml").write_text(SENSOR.format(sub_pixel="linear") + "[mount]\n"
+                                          "q_vehicle_from_camera_wxyz = [0.5, 0.5, 0.5, 0.5]\n")
+    rows = {}
+    for form in ("csv", "jsonl"):
+        command = [hzn_program, "run", "-q", path, "-o", "-", "--format", form]
+        rows[form] = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    expected = json.loads(rows["jsonl"])
+    # The checksum of a line of a file, which a report does not have.
+    columns = rows["csv"].splitlines()[0].split(",")
+    assert columns.pop() == "crc32" and expected.pop("crc32")
+    (report,) = hzn.Sensor.from_toml(tmp_path / "sensor.toml").process_many([path])
+    row = report.to_dict()
+    assert list(row) == list(expected) == columns
+    assert {**row, "elapsed_us": None} == {**expected, "elapsed_us": None}
+    # Every array of the report is there, number by number.
+    for stem, vector in [("axis", report.axis), ("axis_free", report.axis_free), ("axis_v", report.axis_vehicle),
+                         ("axis_by_cos", report.axis_by_cos)]:
+        assert [row[f"{stem}_{i}"] for i in "xyz"] == list(vector)
+    for stem, matrix in [("cov", report.covariance), ("cov_free", report.covariance_free),
+                         ("cov_common", report.covariance_common)]:
+        for (i, a), (j, b) in itertools.combinations_with_replacement(enumerate("xyz"), 2):
+            assert row[f"{stem}_{a}{b}"] == matrix[i, j]
+    for name in ("index", "file", "time_s", "body", "status", "detail", "p_limb", "protection_deg", "sigma_max_deg",
+                 "altitude_km", "altitude_est_km", "half_angle_deg", "rms_px", "roll_deg", "pitch_deg"):
+        assert row[name] == getattr(report, name)
+    # What the docstring leaves out.
+    assert not any(name.startswith("nadir") for name in row) and report.nadir is not None

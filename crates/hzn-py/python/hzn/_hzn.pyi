@@ -397,11 +397,14 @@ class Sensor:
             "ganymede", "callisto", "mimas", "enceladus", "tethys", "dione", "rhea", "titan",
             "iapetus", "miranda", "ariel", "umbriel", "titania", "oberon", "triton", "charon",
         ] = "earth",
+        topic: str | None = None,
         flight: bool = False,
     ) -> Sensor:
         """Make a sensor for a camera without a calibration: the one that ``hzn init`` writes.
 
-        Unknown properties of the lens get a sigma, which the covariance of the answers includes.
+        Unknown properties of the lens get a sigma, which the covariance of the answers includes. A recording of ROS 2
+        with a ``sensor_msgs/CameraInfo`` beside its pictures has a calibration, which is used unless ``fov_deg`` or
+        ``lens`` is given.
 
         Parameters
         ----------
@@ -420,20 +423,23 @@ class Sensor:
             Altitude of all pictures above WGS-84, or above the mean radius of another body, km.
         body
             The body in the pictures.
+        topic
+            Topic of the pictures in an MCAP or a bag of ROS 2; without it, the first topic with pictures.
         flight
             As for `Sensor`.
 
         Raises
         ------
         ConfigError
-            A value is refused, or nothing says the field of view.
+            A value is refused, nothing says the field of view, or a recorded calibration is for another size.
         ImageError
-            The pictures cannot be read, or have different sizes.
+            The pictures cannot be read, or have different sizes; or there are none on ``topic``.
 
         Warns
         -----
         UserWarning
-            EXIF or the limb in the pictures contradicts the field of view, or the camera was turned.
+            EXIF or the limb in the pictures contradicts the field of view, the camera was turned, or the recording has
+            further topics with pictures.
 
         Examples
         --------
@@ -617,6 +623,7 @@ class Sensor:
         self,
         images: _Path | Iterable[_Picture | _Path | tuple[_Picture | _Path, Mapping[str, Any]]],
         *,
+        topic: str | None = None,
         jobs: int | None = None,
         progress: bool = False,
     ) -> Iterator[_Result]:
@@ -629,6 +636,8 @@ class Sensor:
             pictures; or arrays; or pairs of an array or a path and a dictionary of keyword arguments of `process`
             (``altitude_km`` and so on). An iterable is read only as fast as it is processed: each thread takes some
             milliseconds' work or 8 MB at a time, and at least one picture.
+        topic
+            Topic of the pictures in an MCAP or a bag of ROS 2; without it, the first topic with pictures.
         jobs
             Number of threads; without it, one per core. With ``threshold.method = "track"`` and with
             ``track.full_every`` there is only one.
@@ -644,7 +653,8 @@ class Sensor:
         Raises
         ------
         ConfigError
-            There are no pictures, or the frames.csv has an error.
+            There are no pictures, the recording has none on ``topic`` (the message names its topics), or the frames.csv
+            has an error.
         KeyboardInterrupt
             Comes within about the time of one picture; the pictures in progress are finished first.
         """
@@ -929,7 +939,18 @@ class Report:
         """
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the row that ``hzn run`` would write, by column; None for an empty cell."""
+        """Return the row that ``hzn run`` would write, by column; None for an empty cell.
+
+        The names are those of CSV and JSON Lines: ``time_s``, the axis as ``axis_x``, ``axis_y``, ``axis_z``, its
+        covariance as ``cov_xx`` to ``cov_zz``, ``p_limb``, `X
+        `nadir` and `nadir_error_deg` are no columns. They follow from the axis, the altitude and the attitude of the
+        picture, and a file of results has the first two, but never the attitude.
+
+        Examples
+        --------
+        >>> table = pandas.DataFrame(report.to_dict() for report in reports)
+        >>> row = report.to_dict() | {"nadir": report.nadir, "nadir_error_deg": report.nadir_error_deg}
+        """
 
     def __bool__(self) -> bool: ...
     def __copy__(self) -> Report: ...
@@ -1419,7 +1440,7 @@ def _fuse(
 def _number(report: Report, index: int) -> Report: ...
 @final
 class _Sequence:
-    def __new__(cls, sensor: Sensor, inputs: Sequence[_Path]) -> _Sequence: ...
+    def __new__(cls, sensor: Sensor, inputs: Sequence[_Path], topic: str | None = None) -> _Sequence: ...
     def total(self) -> int | None: ...
     def __iter__(self) -> _Sequence: ...
     def __next__(self) -> _Item: ...

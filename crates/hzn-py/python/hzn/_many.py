@@ -9,14 +9,14 @@ from __future__ import annotations
 import os
 import threading
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from itertools import chain
 from queue import SimpleQueue
 from time import perf_counter
 from typing import Any, TypeVar
 
-from ._hzn import ConfigError, Report, Rig, Sensor, _number, _Prior, _RigEpoch, _RigMemory, _Sequence
+from ._hzn import ConfigError, ImageError, Report, Rig, Sensor, _number, _Prior, _RigEpoch, _RigMemory, _Sequence
 
 _TASK_S = 2e-3
 _TASK_BYTES = 8 << 20
@@ -25,10 +25,12 @@ _NOTHING = object()
 _Done = TypeVar("_Done")
 
 
-def process_many(sensor: Sensor, images: Any, jobs: int | None, progress: bool) -> Iterator[Report]:
+def process_many(
+    sensor: Sensor, images: Any, topic: str | None, jobs: int | None, progress: bool
+) -> Iterator[Report]:
     """Implement `Sensor.process_many`."""
     threads = _threads(jobs)
-    work, items, total = _work(sensor, images)
+    work, items, total = _work(sensor, images, topic)
     reports = _in_order(work, items, threads)
     return _with_bar(reports, total) if progress else reports
 
@@ -74,18 +76,28 @@ def _threads(jobs: int | None) -> int:
     return jobs or len(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1))
 
 
-def _work(sensor: Sensor, images: Any) -> tuple[Callable[[Any], Report], Iterable[Any], int | None]:
+def _work(
+    sensor: Sensor, images: Any, topic: str | None
+) -> tuple[Callable[[Any], Report], Iterable[Any], int | None]:
     """Return the function for each item, the items, and their number if it is known."""
     if isinstance(images, str | os.PathLike):
-        return _files(sensor, [images])
+        return _files(sensor, [images], topic)
+    camera = sensor.parameters["camera"]
+    if getattr(images, "ndim", 0) in (2, 3) and images.shape[:2] == (camera["height"], camera["width"]):
+        raise ImageError("images: this array is one picture, and several are expected; write [image]")
     iterator = iter(images)
     first = next(iterator, _NOTHING)
     if isinstance(first, str | os.PathLike):
-        return _files(sensor, [first, *iterator])
+        return _files(sensor, [first, *iterator], topic)
+    if topic is not None:
+        raise ConfigError("topic: arrays have no topics; give the path of a recording, or leave out topic")
 
     def process(numbered: _Numbered) -> Report:
         item = numbered.item
-        image, known = item if isinstance(item, tuple) else (item, {})
+        image, known = item if isinstance(item, tuple) and len(item) == 2 else (item, {})
+        if not isinstance(known, Mapping):
+            what = f'a pair has a picture and a dict such as {{"altitude_km": 400.0}}, not {type(known).__name__}'
+            raise TypeError(f"images: {what}")
         return _number(sensor.process(image, **known), numbered.index)
 
     total = len(images) if hasattr(images, "__len__") else None
@@ -105,9 +117,9 @@ class _Numbered:
 
 
 def _files(
-    sensor: Sensor, paths: Sequence[str | os.PathLike[str]]
+    sensor: Sensor, paths: Sequence[str | os.PathLike[str]], topic: str | None
 ) -> tuple[Callable[[Any], Report], Iterable[Any], int | None]:
-    sequence = _Sequence(sensor, paths)
+    sequence = _Sequence(sensor, paths, topic)
     return sequence.process, sequence, sequence.total()
 
 
