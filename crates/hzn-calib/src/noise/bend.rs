@@ -15,9 +15,6 @@ use super::cone::Cone;
 
 /// Number of shapes that are examined in the mean residuals.
 pub(crate) const SHAPES: usize = 3;
-/// Smallest common shape of an edge, as a part of the common shift. It is an assumption: what shifts all edges may
-/// change along them by a fifth, and not be visible in the residuals.
-const MIN_PART_OF_SHIFT: f64 = 0.2;
 
 /// Returns the Legendre polynomials of the degrees 3 to 5 at x from −1 to 1, scaled to an RMS of 1.
 pub(crate) fn next_shapes(x: f64) -> [f64; SHAPES] {
@@ -46,12 +43,9 @@ pub(crate) fn shapes_px(cone: &Cone) -> [f64; SHAPES] {
 }
 
 /// Returns the RMS in pixels of the bend that all edges may have in common: the amplitude of the strongest next shape
-/// in the mean of their residuals, or its standard error if that is larger, but at least a part of `shift_px`, the
-/// common shift of all edges. `edges` has the amplitudes of each edge ([`shapes_px`]).
-pub(crate) fn common_bend_px<'a>(
-    edges: impl ExactSizeIterator<Item = &'a [f64; SHAPES]> + Clone,
-    shift_px: f64,
-) -> f64 {
+/// in the mean of their residuals, or its standard error if that is larger, but at least `min_px`. `edges` has the
+/// amplitudes of each edge ([`shapes_px`]).
+pub(crate) fn common_bend_px<'a>(edges: impl ExactSizeIterator<Item = &'a [f64; SHAPES]> + Clone, min_px: f64) -> f64 {
     let n = edges.len().max(1) as f64;
     let amplitude = |k: usize| {
         let values = || edges.clone().filter_map(move |shapes| shapes.get(k));
@@ -59,7 +53,7 @@ pub(crate) fn common_bend_px<'a>(
         let variance = values().map(|v| (v - mean).powi(2)).sum::<f64>() / (n * (n - 1.0).max(1.0));
         mean.abs().max(variance.sqrt())
     };
-    (0..SHAPES).map(amplitude).fold(MIN_PART_OF_SHIFT * shift_px, f64::max)
+    (0..SHAPES).map(amplitude).fold(min_px, f64::max)
 }
 
 #[cfg(test)]

@@ -22,6 +22,10 @@ const DEFAULT_SIGMA_KM: f64 = 2.0 * MAX_SIGMA_KM;
 /// Floor of the slow part of the errors along an edge and thus of its common shift, in pixels: the default of
 /// `covariance.sigma_px`. Blur and threshold move the middle of an edge by fractions of a pixel, even if it is smooth.
 const MIN_SHIFT_PX: f64 = 0.1;
+/// Smallest common bend of the edges, as a part of their shift. It is an assumption: what shifts all edges may change
+/// along them by half, and not be visible in the residuals. The bends that explain the errors of the limb heights of
+/// eight rendered flights have an RMS of 0.05 px, which is half of the smallest shift.
+const MIN_BEND: f64 = 0.5;
 /// Value of a tilt at the ends of an edge if its RMS along the edge is 1: √3.
 const TILT_END_PER_RMS: f64 = 1.732_050_807_568_877_2;
 /// Largest distance of a picture's limb height from the median of all, in sigmas. A picture farther away has another
@@ -302,7 +306,7 @@ fn combine_heights(profile: &Profile, sightings: &[&Sighting], edge: &Edge) -> H
     let (statistical_km, scatter_km) = (mean_variance.sqrt(), scatter2.sqrt());
     // Noise that is new at every point averages out along an edge; only the slow part can be a shift.
     let shift_km = edge.bias_px * mean_square(&|s| s.km_per_px).sqrt();
-    let bend_px = bend::common_bend_px(sightings.iter().map(|s| &s.shapes_px), edge.bias_px);
+    let bend_px = bend::common_bend_px(sightings.iter().map(|s| &s.shapes_px), MIN_BEND * edge.bias_px);
     let bend_km = bend_px * mean_square(&|s| s.km_per_bend_px).sqrt();
     let radius_km = mean_square(&|s| s.radius_sigma_km).sqrt();
     // The lens is the same in all pictures, so that its modes change the mean height and average out in nothing.
