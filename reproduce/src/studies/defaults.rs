@@ -303,9 +303,9 @@ pub(super) fn default_settings(effort: &Effort) -> anyhow::Result<Section> {
     s.text(
         "The table compares the values that `hzn calibrate noise` finds on each flight, without the truth, with the \
          truth of the same pictures. The parts of sigma in brackets come from edge noise over all pictures, scatter \
-         between pictures, a shift of all edges by the slow part of their errors (at least 0.1 px), and a bend that the \
-         pictures share. \
-         Goals: at most 2σ off; a sigma of at most 1.5 km in `rocket-clean` and `horace` and 3 km in `leo-infrared`; \
+         between pictures, a shift of all edges by the slow part of their errors (at least 0.1 px), and a bend that \
+         the pictures share (at least half of the shift). Goals: at most 2σ off; a sigma of at most 1.5 km in \
+         `rocket-clean` and `horace` and 3 km in `leo-infrared`; \
          latitudes within 1 km; an alarm (χ² above 2) or a refusal in `tumble` without rates, and in no other \
          flight. [BB] (36) has edge errors of 1 px over 300 px; the edge noise of `rocket-clean` is that of the same \
          kind of flight.",

@@ -2,8 +2,8 @@
 //!
 //! A fit averages out what is new at every point, and keeps what changes slowly along the edge. The likelihood of all
 //! residuals does not separate the two: it follows the short correlation of noise and blur, which has most of the
-//! variance, and loses a slow part of a fifth of the RMS. Means over windows show the slow part. With the variance s² of
-//! a Gauss-Markov process whose length is the window w, and with errors that are much shorter, the means have the
+//! variance, and loses a slow part of a fifth of the RMS. Means over windows show the slow part. With the variance s²
+//! of a Gauss-Markov process whose length is the window w, and with errors that are much shorter, the means have the
 //! variances V(w) = m(1) s² + a/w and V(w/2) = m(½) s² + 2a/w, where m(x) = 2 (x − 1 + e⁻ˣ)/x². Thus s² = (2 V(w) −
 //! V(w/2))/(2 m(1) − m(½)), whatever the short errors are.
 
