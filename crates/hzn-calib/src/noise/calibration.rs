@@ -23,8 +23,9 @@ const DEFAULT_SIGMA_KM: f64 = 2.0 * MAX_SIGMA_KM;
 /// `covariance.sigma_px`. Blur and threshold move the middle of an edge by fractions of a pixel, even if it is smooth.
 const MIN_SHIFT_PX: f64 = 0.1;
 /// Smallest common bend of the edges, as a part of their shift. It is an assumption: what shifts all edges may change
-/// along them by half, and not be visible in the residuals. The bends that explain the errors of the limb heights of
-/// eight rendered flights have an RMS of 0.05 px, which is half of the smallest shift.
+/// along them by half, and not be visible in the residuals. On the nine flights of `rocket`, `rocket-clean` and
+/// `horace-wide` in `cargo xtask reproduce defaults`, bends with an RMS of 0.05 px explain the errors of the limb
+/// heights. This is half of the smallest shift.
 const MIN_BEND: f64 = 0.5;
 /// Value of a tilt at the ends of an edge if its RMS along the edge is 1: √3.
 const TILT_END_PER_RMS: f64 = 1.732_050_807_568_877_2;

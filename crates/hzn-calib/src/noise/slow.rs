@@ -1,11 +1,11 @@
 //! The slow part of the errors along an edge: what remains in a mean over a window of a twelfth of the edge.
 //!
-//! A fit averages out what is new at every point, and keeps what changes slowly along the edge. The likelihood of all
-//! residuals does not separate the two: it follows the short correlation of noise and blur, which has most of the
-//! variance, and loses a slow part of a fifth of the RMS. Means over windows show the slow part. With the variance s²
-//! of a Gauss-Markov process whose length is the window w, and with errors that are much shorter, the means have the
-//! variances V(w) = m(1) s² + a/w and V(w/2) = m(½) s² + 2a/w, where m(x) = 2 (x − 1 + e⁻ˣ)/x². Thus s² = (2 V(w) −
-//! V(w/2))/(2 m(1) − m(½)), whatever the short errors are.
+//! A fit averages out errors that are new at every point. It keeps errors that change slowly along the edge. The
+//! likelihood of all residuals does not separate the two: it follows the short correlation of noise and blur, which has
+//! most of the variance, and loses a slow part of a fifth of the RMS. Means over windows show the slow part. With the
+//! variance s² of a Gauss-Markov process whose length is the window w, and with errors that are much shorter, the means
+//! have the variances V(w) = m(1) s² + a/w and V(w/2) = m(½) s² + 2a/w, where m(x) = 2 (x − 1 + e⁻ˣ)/x². Thus
+//! s² = (2 V(w) − V(w/2))/(2 m(1) − m(½)), whatever the short errors are.
 
 use super::cone::Cone;
 
@@ -54,7 +54,7 @@ mod tests {
     use crate::noise::tests::{Noise, camera, earth, limb, solution};
     use crate::noise::{Calibration, Sighting, WeightedPoints};
 
-    /// Noise that is ten times as large hides the slow part from a likelihood, but not from means over windows.
+    /// Stronger noise hides the slow part from a likelihood, but not from means over windows.
     #[test]
     fn a_slow_part_below_strong_noise_is_found() {
         let found = |slow_px: f64, seed: u64| {

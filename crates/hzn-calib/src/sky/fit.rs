@@ -32,8 +32,8 @@ const FREE_KM: f64 = 1e3;
 /// pixel, even if the edge is smooth.
 const MIN_SHIFT_PX: f64 = 0.1;
 /// Smallest common bend of the edges of a side, as a part of their shift. It is an assumption: what shifts all edges
-/// may change along them by a fifth, and not be visible in the residuals. With it none of 100 rendered flights with
-/// their true lens raised the alarm.
+/// may change along them by a fifth, and not be visible in the residuals. With it no true lens raised the alarm in
+/// `cargo xtask campaign check 100`.
 const MIN_BEND: f64 = 0.2;
 /// Largest distance of a picture's limb height from the fitted one, in sigmas. A picture farther away has another edge.
 const MAX_DEVIATION_SIGMAS: f64 = 6.0;

@@ -344,7 +344,7 @@ fn errors_without_a_sensor_are_told_with_what_to_do() {
     // A rig is a design without a file.
     let rig = run(&["rig", "--altitude", "400"]).says(assumed);
     assert!(!rig.err.contains("sensor.toml"), "{}", rig.err);
-    // Those of the command line are told as they are, and what is stated needs no word.
+    // The note has the values of the command line. If the command line states all of them, there is no note.
     run(&["--altitude", "400", "--sigma-px", "0.3", "--altitude-sigma", "2"])
         .says("edge points 0.30 px")
         .says("+- 2 km. -s");
