@@ -59,7 +59,7 @@ pub fn verdict_text(verdict: Verdict, s: &gates::Config, kind: Kind) -> String {
         Verdict::Layer => {
             "at night, the light below the edge does not become less, or none is left: it is no layer of airglow".into()
         }
-        Verdict::Faint => "the brightness hardly changes across the edge, as in twilight".into(),
+        Verdict::Faint => "the light fades slowly across the edge, as in twilight or high above a limb".into(),
         Verdict::Unlikely => format!("its probability to be the limb is below {} (gates.min_p_limb)", s.min_p_limb),
         Verdict::Glow => glow_text(kind),
         Verdict::Attitude => format!(

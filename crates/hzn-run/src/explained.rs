@@ -216,6 +216,14 @@ impl Explained<'_> {
             let what = "points are at the global threshold, because no local mid-level was found";
             line("sub-pixel", format!("{} of {} {what}", c.fallback_points, c.edge_points));
         }
+        let answer = self.report.solution.as_ref().map(|solution| solution.candidate);
+        if let Some(edge) = self.trace.edges().iter().find(|e| Some(e.candidate) == answer && e.clipped > 0.0) {
+            let percent = (100.0 * edge.clipped).ceil();
+            line(
+                "clipped",
+                format!("{percent} % of the limb is next to light at full scale, and appears higher there"),
+            );
+        }
         if self.report.stage >= Stage::Consensus {
             let consensus = &self.config.consensus;
             let noisy = match consensus.noise_sigma {

@@ -59,12 +59,17 @@ pub fn config_for_calibration(sensor: &Config) -> Option<Config> {
 pub struct Height {
     /// Height; with rows by latitude it is their mean over the visible limb.
     pub km: f64,
-    /// 1-sigma for the sensor: the root sum of squares of the six parts that follow.
+    /// 1-sigma for the sensor: the root sum of squares of the seven parts.
     pub sigma_km: f64,
     /// Part from edge noise, over all pictures.
     pub statistical_km: f64,
     /// Part from the scatter between pictures that edge noise does not explain.
     pub scatter_km: f64,
+    /// Part from the height that clipping at full scale adds; 0 if no picture is clipped.
+    pub clipping_km: f64,
+    /// The height that clipping adds to a limb all of which is clipped, with its 1-sigma, in kilometres; `None` if no
+    /// picture is clipped.
+    pub clipped_km: Option<[f64; 2]>,
     /// Part from a shift of all edges by the slow part of the residuals, or by 0.1 px if that is larger. Threshold and
     /// blur cause it, and it is the same in every picture.
     pub shift_km: f64,
@@ -85,6 +90,7 @@ impl Height {
     fn largest_part_km(&self) -> (&'static str, f64) {
         let parts = [
             ("scatter between pictures", self.scatter_km),
+            ("light that is clipped at full scale", self.clipping_km),
             ("a common shift of all edges", self.shift_km),
             ("a bend that all edges share", self.bend_km),
             ("the lens", self.lens_km),
@@ -179,13 +185,14 @@ impl Calibration {
         if sightings.len() < MIN_PICTURES {
             return Err(few(sightings.len()));
         }
-        let consistent = find_consistent(sightings);
+        let clipped_km = [body.clipped_height_km, body.clipped_sigma_km];
+        let consistent = find_consistent(sightings, clipped_km);
         let inconsistent = sightings.len() - consistent.len();
         if inconsistent as f64 > MAX_INCONSISTENT * sightings.len() as f64 {
             return Err(Refusal::Inconsistent { inconsistent, pictures: sightings.len() });
         }
         let vague = |sigma_km: f64| Refusal::TooVague { sigma_km, max_km: MAX_SIGMA_KM, pictures: consistent.len() };
-        let profile = fit_profile(&consistent).ok_or(vague(f64::INFINITY))?;
+        let profile = fit_profile(&consistent, clipped_km).ok_or(vague(f64::INFINITY))?;
         let edge = combine_edges(&consistent);
         let height = combine_heights(&profile, &consistent, &edge);
         if height.statistical_km > MAX_SIGMA_KM {
@@ -262,8 +269,9 @@ impl Calibration {
         let Some(body) = sensor.each_body_mut().iter_mut().find(|b| b.kind == self.body) else { return };
         let [km, sigma_km] = [self.height.km, self.height.sigma_km].map(round_to_written_digits);
         body.tell_limb_height(km, sigma_km);
-        // The measured height already includes the effect of clipped limbs.
-        body.clipped_height_km = 0.0;
+        if let Some(km) = self.clipped_height_km() {
+            body.clipped_height_km = km;
+        }
         body.limb_height_by_latitude_km =
             self.height.by_latitude.iter().map(|[deg, km, _]| [*deg, round_to_written_digits(*km)]).collect();
         if several {
@@ -274,46 +282,59 @@ impl Calibration {
     }
 }
 
+impl Calibration {
+    /// Returns the height that clipping adds, in kilometres, as it is written; `None` if no picture is clipped. Clipping
+    /// cannot lower a limb.
+    pub(super) fn clipped_height_km(&self) -> Option<f64> {
+        self.height.clipped_km.map(|[km, _]| round_to_written_digits(km.max(0.0)))
+    }
+}
+
 /// Rounds to the three decimals that are written.
 pub(super) fn round_to_written_digits(x: f64) -> f64 {
     (x * 1e3).round() / 1e3
 }
 
-/// Returns the sightings without those whose height disagrees with all others.
-fn find_consistent(all: &[Sighting]) -> Vec<&Sighting> {
-    let middle_km = median(all.iter().map(|s| s.limb_height_km));
-    let typical_km = 1.4826 * median(all.iter().map(|s| (s.limb_height_km - middle_km).abs()));
+/// Returns the sightings without those whose height disagrees with all others. `clipped_km` is the height that clipping
+/// adds, with its 1-sigma.
+fn find_consistent(all: &[Sighting], [clipped_km, clipped_sigma_km]: [f64; 2]) -> Vec<&Sighting> {
+    let unclipped_km = |s: &Sighting| s.limb_height_km - clipped_km * s.clipped;
+    let middle_km = median(all.iter().map(unclipped_km));
+    let typical_km = 1.4826 * median(all.iter().map(|s| (unclipped_km(s) - middle_km).abs()));
     let is_near = |s: &&Sighting| {
-        (s.limb_height_km - middle_km).abs() <= MAX_DEVIATION_SIGMAS * typical_km.hypot(s.sigma_km).max(0.1)
+        let own_km = s.sigma_km.hypot(clipped_sigma_km * s.clipped);
+        (unclipped_km(s) - middle_km).abs() <= MAX_DEVIATION_SIGMAS * typical_km.hypot(own_km).max(0.1)
     };
     all.iter().filter(is_near).collect()
 }
 
 fn combine_heights(profile: &Profile, sightings: &[&Sighting], edge: &Edge) -> Height {
     let Solved { h, covariance, scatter2, .. } = &profile.solved;
-    let (n, parameters) = (sightings.len() as f64, h.len());
-    // The mean weights of the parameters over all pictures.
-    let mut mean_weights = vec![0.0; parameters];
+    let (n, rows) = (sightings.len() as f64, profile.rows());
+    // The mean weights of the heights over all pictures: that of the clipping is left out.
+    let mut mean_weights = vec![0.0; rows];
     for s in sightings {
         mean_weights.iter_mut().zip(profile.weights(s)).for_each(|(sum, weight)| *sum += weight / n);
     }
     let km = mean_weights.iter().zip(h.iter()).map(|(a, h)| a * h).sum();
     let weight = |i: usize, j: usize| mean_weights.get(i).zip(mean_weights.get(j)).map_or(0.0, |(a, b)| a * b);
-    let mean_variance: f64 = (0..parameters)
-        .flat_map(|i| (0..parameters).map(move |j| (i, j)))
-        .map(|(i, j)| weight(i, j) * covariance[(i, j)])
-        .sum();
-    let mean_square = |value: &dyn Fn(&Sighting) -> f64| sightings.iter().map(|s| value(s).powi(2)).sum::<f64>() / n;
-    let (statistical_km, scatter_km) = (mean_variance.sqrt(), scatter2.sqrt());
+    let [mean_variance, by_clipping] = (0..rows)
+        .flat_map(|i| (0..rows).map(move |j| (i, j)))
+        .map(|(i, j)| profile.covariance_km2(i, j).map(|km2| weight(i, j) * km2))
+        .fold([0.0; 2], |sum, term| [sum[0] + term[0], sum[1] + term[1]]);
+    // What all edges have in common changes the height by as much as the pictures that determine it. A picture with a
+    // short arc has a large change and hardly any weight.
+    let mean = |value: &dyn Fn(&Sighting) -> f64| weighted_mean(profile, sightings, value);
+    let mean_square = |value: &dyn Fn(&Sighting) -> f64| mean(&|s| value(s).powi(2));
+    let statistical_km = (mean_variance - by_clipping).max(0.0).sqrt();
     // Noise that is new at every point averages out along an edge; only the slow part can be a shift.
     let shift_km = edge.bias_px * mean_square(&|s| s.km_per_px).sqrt();
     let bend_px = bend::common_bend_px(sightings.iter().map(|s| &s.shapes_px), MIN_BEND * edge.bias_px);
     let bend_km = bend_px * mean_square(&|s| s.km_per_bend_px).sqrt();
     let radius_km = mean_square(&|s| s.radius_sigma_km).sqrt();
     // The lens is the same in all pictures, so that its modes change the mean height and average out in nothing.
-    let by_mode = |k: usize| sightings.iter().map(|s| s.km_by_lens[k]).sum::<f64>() / n;
-    let lens_km = (0..INTRINSICS).map(|k| by_mode(k).powi(2)).sum::<f64>().sqrt();
-    let rows = profile.latitudes_deg.iter().enumerate();
+    let lens_km = (0..INTRINSICS).map(|k| mean(&|s| s.km_by_lens[k]).powi(2)).sum::<f64>().sqrt();
+    let by_latitude = profile.latitudes_deg.iter().enumerate();
     let row = |(k, deg): (usize, &f64)| [*deg, h[k], covariance[(k, k)].sqrt()];
     Height {
         km,
@@ -322,13 +343,25 @@ fn combine_heights(profile: &Profile, sightings: &[&Sighting], edge: &Edge) -> H
             + [shift_km, bend_km, lens_km, radius_km].map(|km| km * km).iter().sum::<f64>())
         .sqrt(),
         statistical_km,
-        scatter_km,
+        scatter_km: scatter2.sqrt(),
+        clipping_km: by_clipping.sqrt(),
+        clipped_km: profile.clipped_km(),
         shift_km,
         bend_km,
         lens_km,
         radius_km,
-        by_latitude: rows.map(row).collect(),
+        by_latitude: by_latitude.map(row).collect(),
     }
+}
+
+/// Returns the mean of a value of the pictures, with the weights that they have in the height.
+fn weighted_mean(profile: &Profile, sightings: &[&Sighting], value: &dyn Fn(&Sighting) -> f64) -> f64 {
+    let weight = |s: &Sighting| 1.0 / (s.sigma_km * s.sigma_km + profile.solved.scatter2);
+    let (sum, weights) = sightings.iter().fold((0.0, 0.0), |(sum, weights), s| {
+        let weight = weight(s);
+        (sum + weight * value(s), weights + weight)
+    });
+    sum / weights
 }
 
 /// Computes sigma and length, the slow part, and the most likely (L, ν) of all pictures together, each picture with its
@@ -362,10 +395,14 @@ fn fit_focal(profile: &Profile, sightings: &[&Sighting]) -> Option<Focal> {
             weights.push(-s.km_per_focal * 1e-2);
             Measured { km: s.limb_height_km, variance_km2: s.sigma_km * s.sigma_km, weights }
         })
+        .chain(profile.clipping.clone().map(|mut prior| {
+            prior.weights.push(0.0);
+            prior
+        }))
         .collect();
     let solved = solve(&measured)?;
     let last = solved.h.len().checked_sub(1)?;
-    let mean = sightings.iter().map(|s| s.km_per_focal).sum::<f64>() / sightings.len() as f64;
+    let mean = weighted_mean(profile, sightings, &|s| s.km_per_focal);
     let sigma_percent = solved.covariance[(last, last)].sqrt();
     sigma_percent.is_finite().then_some(Focal { percent: solved.h[last], sigma_percent, km_per_permille: mean * 1e-3 })
 }

@@ -56,6 +56,8 @@ pub struct Sighting {
     pub arc_px: f64,
     /// Correlation length, in pixels, at which edge errors of this RMS explain the edge noise part of `sigma_km`.
     pub correlation_px: f64,
+    /// Part of the edge points whose lit side is clipped at full scale, from 0 to 1.
+    pub(super) clipped: f64,
     /// Geodetic latitudes of the visible limb in degrees, each with its share of the height; empty without a position.
     pub latitudes: Vec<(f64, f64)>,
     /// Amplitude of each next shape in the residuals, in pixels.
@@ -139,11 +141,19 @@ impl Sighting {
             km_by_lens: core::array::from_fn(|k| by_lens_km(&|row| row.by_lens_px[k])),
             rms_px: cone.rms_px(),
             arc_px: cone.arc_px(),
+            clipped: 0.0,
             correlation_px: edge::equivalent_length_px(&cone, cone.rms_px(), noise),
             latitudes: latitudes(&geometry, &cone, &known, attitude_sigma),
             lags: Lags::new(&cone),
             scores,
         })
+    }
+
+    /// Returns the sighting of a picture in which this part of the edge points, 0 to 1, has a lit side that is clipped
+    /// at full scale. There the limb appears higher.
+    #[must_use]
+    pub fn with_clipped(self, part: f64) -> Self {
+        Self { clipped: part, ..self }
     }
 }
 

@@ -85,7 +85,14 @@ pub(crate) fn solution(axis: Vector3<f64>, half_angle_rad: f64) -> Solution<f64>
 
 /// Returns sightings of a limb at `limb_km` from 180 km altitude on, with `fov_deg`. `scatter_km` is the scatter
 /// between pictures.
-fn flight(count: usize, fov_deg: f64, limb_km: f64, scatter_km: f64, noise: Noise, seed: u64) -> Vec<Sighting> {
+pub(super) fn flight(
+    count: usize,
+    fov_deg: f64,
+    limb_km: f64,
+    scatter_km: f64,
+    noise: Noise,
+    seed: u64,
+) -> Vec<Sighting> {
     flight_through(camera(fov_deg), count, limb_km, scatter_km, noise, seed)
 }
 

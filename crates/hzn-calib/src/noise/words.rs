@@ -33,6 +33,9 @@ pub fn lines(calibration: &Calibration, pictures: &str, camera: &Config) -> Vec<
         ),
         ("", format!("{:.2} km for a bend that all edges share", h.bend_km)),
     ];
+    if h.clipped_km.is_some() {
+        lines.push(("", format!("{:.2} km for the height that clipping at full scale adds", h.clipping_km)));
+    }
     if h.lens_km > 0.0 {
         lines.push(("", format!("{:.2} km for the lens, whose sigmas are in sensor.toml", h.lens_km)));
     }
@@ -41,6 +44,9 @@ pub fn lines(calibration: &Calibration, pictures: &str, camera: &Config) -> Vec<
     }
     for [deg, km, sigma] in &h.by_latitude {
         lines.push(("by latitude", format!("{deg:.0}°: {km:.2} km ± {sigma:.2} km")));
+    }
+    if let Some([km, sigma_km]) = h.clipped_km {
+        lines.push(("clipping", format!("{km:.2} km ± {sigma_km:.2} km where all of the limb is at full scale")));
     }
     lines.push(("edge noise", format!("{:.3} px, correlation length {:.0} px", e.sigma_px, e.correlation_px)));
     let white = 100.0 * e.white;

@@ -102,6 +102,9 @@ fn limb_lines(calibration: &Calibration, source: &str) -> Vec<Line> {
         format!("{:.2} km from a shift of all edges by the slow part of their errors, at least 0.1 px", h.shift_km),
         format!("{:.2} km from a bend that all edges have in common", h.bend_km),
     ];
+    if h.clipping_km > 0.0 {
+        parts.push(format!("{:.2} km from the height that clipping at full scale adds", h.clipping_km));
+    }
     if h.lens_km > 0.0 {
         parts.push(format!("{:.2} km from the lens", h.lens_km));
     }
@@ -115,12 +118,11 @@ fn limb_lines(calibration: &Calibration, source: &str) -> Vec<Line> {
             why: format!("measured on {counted} pictures of {source} by `hzn calibrate noise`"),
         },
         Line { key: "limb_height_sigma_km", value: round_to_written_digits(h.sigma_km).into(), why: parts.join(", ") },
-        Line {
-            key: "clipped_height_km",
-            value: 0.0.into(),
-            why: "the measured height includes the effect of clipping".into(),
-        },
     ];
+    if let Some((km, [_, sigma_km])) = calibration.clipped_height_km().zip(h.clipped_km) {
+        let why = format!("± {sigma_km:.2} km; it is known better where the clipped part differs between pictures");
+        lines.push(Line { key: "clipped_height_km", value: km.into(), why });
+    }
     if !h.by_latitude.is_empty() {
         let row = |[deg, km, _]: &[f64; 3]| Array::from_iter([*deg, round_to_written_digits(*km)]);
         let sigmas: Vec<String> =

@@ -81,6 +81,10 @@ pub trait Observer<T> {
     /// A sub-pixel point of a candidate is found. The points come in order, numbered from 0.
     #[inline(always)]
     fn point(&self, _candidate: u32, _point: ImagePoint<T>) {}
+    /// All points of a candidate are found: their number, and the number of those whose lit side is clipped at full
+    /// scale.
+    #[inline(always)]
+    fn points(&self, _candidate: u32, _count: u32, _clipped: u32) {}
     /// The weight of a candidate's point after the fit is known: 0 (rejected) up to 1. This is called only after a fit.
     #[inline(always)]
     fn weight(&self, _candidate: u32, _point: u32, _weight: T) {}
@@ -149,6 +153,9 @@ impl<T> Observer<T> for &dyn Observer<T> {
     }
     fn point(&self, candidate: u32, point: ImagePoint<T>) {
         (**self).point(candidate, point);
+    }
+    fn points(&self, candidate: u32, count: u32, clipped: u32) {
+        (**self).points(candidate, count, clipped);
     }
     fn weight(&self, candidate: u32, point: u32, weight: T) {
         (**self).weight(candidate, point, weight);

@@ -217,6 +217,9 @@ impl<T: Real, O: Observer<T>> Observer<T> for Through<'_, O> {
     fn point(&self, candidate: u32, point: ImagePoint<T>) {
         self.observer.point(candidate, self.crop.picture_point(point));
     }
+    fn points(&self, candidate: u32, count: u32, clipped: u32) {
+        self.observer.points(candidate, count, clipped);
+    }
     fn weight(&self, candidate: u32, point: u32, weight: T) {
         self.observer.weight(candidate, point, weight);
     }

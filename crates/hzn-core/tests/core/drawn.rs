@@ -332,6 +332,33 @@ fn an_edge_without_air_is_an_unlikely_limb() {
     assert!(moon.solution.is_some_and(|s| s.p_limb.is_none()));
 }
 
+#[test]
+fn an_edge_in_the_air_above_the_limb_is_no_limb() {
+    let data = earth_edge(|km, _| limb_light(km));
+    let mut config = earth_sensor();
+    // The points are at the threshold, wherever it is.
+    config.edge_points.sub_pixel = hzn_core::edge_points::SubPixel::None;
+    config.threshold.method = hzn_core::threshold::Method::Fixed;
+    (config.body.limb_height_km, config.body.limb_height_sigma_km) = (17.0, 10.0);
+    // A thermal camera sees no sunlit air, so that the gate is off.
+    let mut unguarded = config.clone();
+    unguarded.body.sunlit = Some(false);
+    let height_km = |config: &Config| {
+        let solution = process(config, &data).solution?;
+        Some((solution.half_angle_rad - (6388.0 / 6771.0f64).asin()) * 2244.0)
+    };
+    for level in [13, 16, 20, 60, 80, 95, 110] {
+        (config.threshold.level, unguarded.threshold.level) = (f64::from(level), f64::from(level));
+        let [answer, without] = [height_km(&config), height_km(&unguarded)];
+        println!("threshold {level}: {answer:?} km, without the gate {without:?} km");
+        if level <= 20 {
+            assert!(answer.is_none() && without.is_some_and(|km| km > 5.0), "threshold {level}: {without:?} km");
+        } else {
+            assert!(answer == without && answer.is_some_and(|km| km < 5.0), "threshold {level}: {answer:?} km");
+        }
+    }
+}
+
 /// Draws a circle of the picture and processes it. Returns the report and the true axis.
 fn circle(config: &Config, centre: [f64; 2], radius_px: f64) -> (Report<f64>, [f64; 3]) {
     let camera = &config.camera;

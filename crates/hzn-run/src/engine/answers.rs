@@ -21,6 +21,8 @@ pub struct Answered<'a> {
     pub which: usize,
     /// Edge points of the answer, px, with their weights.
     pub points: Vec<([f64; 2], f64)>,
+    /// Part of those points whose lit side is clipped at full scale, from 0 to 1.
+    pub clipped: f64,
     /// The prior of the picture, without defaults of the sensor.
     pub prior: Prior<f64>,
     /// The row of the picture in frames.csv.
@@ -104,6 +106,7 @@ fn answer(frame: &Finished, which: usize) -> Option<Answered<'_>> {
         name: &frame.name,
         which,
         points: edge.points.iter().copied().zip(edge.weights.iter().copied()).collect(),
+        clipped: edge.clipped,
         data: frame.data.as_ref(),
         prior: frame.data.as_ref().map_or_else(Prior::default, |d| d.to_prior(None)),
         solution,

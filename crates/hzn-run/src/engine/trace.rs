@@ -27,6 +27,8 @@ pub struct Edge {
     pub stride: u32,
     /// Sub-pixel points (u, v) in pixels.
     pub points: Vec<[f64; 2]>,
+    /// Part of those points whose lit side is clipped at full scale, from 0 to 1.
+    pub clipped: f64,
     /// Weights of those points after the fit; 0 is an outlier. Empty if there was no fit.
     pub weights: Vec<f64>,
     /// The outcome of the candidate.
@@ -203,6 +205,9 @@ impl<T: Real + Into<f64>> Observer<T> for Traces {
     fn point(&self, candidate: u32, point: ImagePoint<T>) {
         self.now().into_iter().for_each(|t| t.point(candidate, point));
     }
+    fn points(&self, candidate: u32, count: u32, clipped: u32) {
+        self.now().into_iter().for_each(|t| Observer::<T>::points(t, candidate, count, clipped));
+    }
     fn weight(&self, candidate: u32, point: u32, weight: T) {
         self.now().into_iter().for_each(|t| t.weight(candidate, point, weight));
     }
@@ -253,6 +258,9 @@ impl<T: Real + Into<f64>> Observer<T> for Trace {
     }
     fn point(&self, candidate: u32, point: ImagePoint<T>) {
         self.change_edge(candidate, |e| e.points.push([point.u.into(), point.v.into()]));
+    }
+    fn points(&self, candidate: u32, count: u32, clipped: u32) {
+        self.change_edge(candidate, |e| e.clipped = f64::from(clipped) / f64::from(count.max(1)));
     }
     fn weight(&self, candidate: u32, point: u32, weight: T) {
         self.change_edge(candidate, |e| {

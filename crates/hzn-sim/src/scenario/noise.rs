@@ -210,8 +210,8 @@ impl Fit {
                 body.tell_limb_height(height_km, sigma_km);
             }
             (body.limb_height_km, body.limb_height_sigma_km) = (height_km, sigma_km);
-            // The measured height already includes clipped limbs.
-            [body.clipped_height_km, body.clipped_sigma_km] = [0.0; 2];
+            // The measured height already includes clipped limbs. What clipping adds to one of them differs.
+            body.clipped_height_km = 0.0;
         }
         if several {
             body.covariance = Some(noise);

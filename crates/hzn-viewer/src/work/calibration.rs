@@ -174,8 +174,10 @@ impl Run {
 
     fn noise(&self, wide: &Config) -> Result<Option<Measured>, String> {
         let camera = Camera::try_new(&wide.camera).map_err(|e| e.to_string())?;
-        let sighting =
-            |a: engine::Answered<'_>| Sighting::measure(a.name, &camera, &wide.body, &a.prior, &a.points, a.solution);
+        let sighting = |a: engine::Answered<'_>| {
+            let sighting = Sighting::measure(a.name, &camera, &wide.body, &a.prior, &a.points, a.solution)?;
+            Some(sighting.with_clipped(a.clipped))
+        };
         let Some(sightings) = self.measure(wide.clone(), sighting)? else { return Ok(None) };
         let mut found = noise::Calibration::new(&wide.body, &sightings).map_err(|why| self.refused(&why))?;
         found.compare_with(&self.task.config);

@@ -63,7 +63,10 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let mut progress = Progress::new(source.total(), 0, args.quiet);
     let body = &plan.config.body;
-    let measure = |a: Answered<'_>| Sighting::measure(a.name, &camera, body, &a.prior, &a.points, a.solution);
+    let measure = |a: Answered<'_>| {
+        let sighting = Sighting::measure(a.name, &camera, body, &a.prior, &a.points, a.solution)?;
+        Some(sighting.with_clipped(a.clipped))
+    };
     let Some((sightings, unread)) = flight::measure_answers(&plan, source.as_mut(), &mut progress, measure)? else {
         tell::line("interrupted; nothing was measured");
         return Ok(Exit::Interrupted);

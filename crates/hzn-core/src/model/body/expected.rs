@@ -292,9 +292,14 @@ impl<T: Real> Expected<T> {
     ///
     /// Full scale cuts the light off at 1/B of its peak. The limb in the picture, at half of full scale, then lies
     /// h ln B higher than the limb at half of the peak, where h is the scale height of the air. B is unknown and varies
-    /// along the limb. This variation counts as a first harmonic in azimuth, to which two sources contribute. The
-    /// difference between clipped and unclipped points has the variance `part` (1 − `part`) times the height squared.
-    /// If the heights at the two ends vary independently by σ each, half of their difference has the sigma σ/√2.
+    /// along the limb. This variation counts as harmonics in azimuth, to which three sources contribute:
+    ///
+    /// - The difference between clipped and unclipped points has the variance `part` (1 − `part`) times the height
+    ///   squared. The first and the second harmonic have half of it each.
+    /// - If the heights at the two ends vary independently by σ each, half of their difference has the sigma σ/√2. This
+    ///   is a first harmonic.
+    /// - Air scatters the light of the Sun by 1 + cos² of the angle to it: twice as much towards the Sun and away from
+    ///   it as across. The amplitude of this second harmonic is h ln 2/2.
     pub(crate) fn clipped(&self, part: T) -> Self {
         if self.free || !(part > T::zero()) {
             return *self;
@@ -310,6 +315,7 @@ impl<T: Real> Expected<T> {
         let limb_sigma_parts_m = [limb, altitude, radius, sigma];
         let one = T::one();
         let apart = self.clipped_m[0] * (part * (one - part)).max(T::zero()).sqrt();
+        let scattered = self.scale_height_m * part * T::from_f64(0.5 * core::f64::consts::LN_2);
         let root = |parts: &[T]| parts.iter().fold(T::zero(), |sum, s| sum + *s * *s).sqrt();
         let [first, second] = self.unknown_harmonics_cos;
         let target =
@@ -327,7 +333,7 @@ impl<T: Real> Expected<T> {
             ellipsoid: self.ellipsoid_at(cos, sin),
             unknown_harmonics_cos: [
                 root(&[first, scale * apart, scale * sigma * T::from_f64(core::f64::consts::FRAC_1_SQRT_2)]),
-                second,
+                root(&[second, scale * apart, scale * scattered]),
             ],
             limb_m: self.limb_m + height,
             limb_sigma_m: root(&[self.limb_sigma_m, sigma]),
@@ -385,7 +391,14 @@ mod tests {
             let same = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-5;
             assert!(same(clipped.cos, higher.cos) && same(clipped.sin, higher.sin), "{part}");
             assert!(same(clipped.sigma_cos, higher.sigma_cos) && same(clipped.limb_m, higher.limb_m), "{part}");
-            assert_eq!(clipped.unknown_harmonics_cos[0] > 0.0, part > 0.0);
+            // In kilometres of height: 7.8 √(p (1 − p)) in both, σ/√2 in the first, and 7.5 ln 2/2 in the second.
+            let by_km = 1e3 * higher.sin / (higher.cos * (6371008.8 + higher.limb_m) / higher.sin);
+            let apart_km = 7.8 * f64::sqrt(part * (1.0 - part));
+            let first_km = libm::hypot(apart_km, 4.5 * part / core::f64::consts::SQRT_2);
+            let second_km = libm::hypot(apart_km, 7.5 * part * core::f64::consts::LN_2 / 2.0);
+            for (found, km) in clipped.unknown_harmonics_cos.into_iter().zip([first_km, second_km]) {
+                assert!((found / by_km - km).abs() < 0.01, "{part}: {} {km}", found / by_km);
+            }
         }
         // No apparent size of the Moon is expected, so clipping changes nothing.
         let moon = at(0.0, 0.0, Kind::Moon);

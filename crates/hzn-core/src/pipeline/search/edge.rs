@@ -117,6 +117,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         }
         self.work.charge(points.extra_cost);
         outcome.points = points.count;
+        self.observer.points(outcome.number, points.count, points.clipped);
         self.report.counters.edge_points += points.count;
         self.report.counters.fallback_points += points.fallback;
         self.report.counters.cut_points += points.cut;

@@ -47,6 +47,13 @@ impl<T: Real> Case<'_, T> {
     pub(super) fn expected_cos(&self) -> T {
         if self.expected.free { self.fit.c } else { self.expected.cos }
     }
+    /// Returns the derivative of s·e by the height of the limb, 1/m. An angle is a height divided by the distance
+    /// (R + d) cot α of the limb; that of s·e = cos ρ is sin ρ dρ.
+    pub(super) fn cos_by_m(&self) -> T {
+        let (c, expected) = (self.fused.c, self.expected);
+        let radius_m = (expected.radius_m + expected.limb_m).max(T::one());
+        (T::one() - c * c).max(T::ZERO) / (c.max(T::from_f64(1e-6)) * radius_m)
+    }
     /// Returns the weighted RMS divided by the part of the limb in view that edge points cover.
     pub(super) fn score(&self) -> T {
         self.fit.rms_px.max(T::from_f64(0.05)) / self.cover.share.max(T::from_f64(1e-3))

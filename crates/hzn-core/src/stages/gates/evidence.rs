@@ -124,17 +124,10 @@ fn misfit<T: Real>(case: &Case<'_, T>, places: &Places<T>, residuals: &mut Resid
     let rms_px = lens::without_lens(case, residuals, |_, bent| bent.rms_px.min(own_px)).unwrap_or(own_px);
     let scale_px = places
         .get(places.len() / 2)
-        .map_or(T::ZERO, |middle| case.expected.scale_height_m * angle_by_m(case) / middle.by_px);
+        .map_or(T::ZERO, |middle| case.expected.scale_height_m * case.cos_by_m() / middle.by_px);
     let rough = scale_px * T::from_f64(ROUGHNESS_SCALE_HEIGHTS);
     let noise = residuals.noise_px.max(T::from_f64(CLEAN_PX));
     (rms_px / (noise * noise + rough * rough).sqrt()).max(T::one()).ln()
-}
-
-/// Returns the derivative of s·e by the height of the limb, 1/m. An angle is a height divided by the distance
-/// (R + d) cot α of the limb; that of s·e = cos ρ is sin ρ dρ.
-fn angle_by_m<T: Real>(case: &Case<'_, T>) -> T {
-    let (c, expected) = (case.fused.c, case.expected);
-    (T::one() - c * c).max(T::ZERO) / (c.max(T::from_f64(1e-6)) * (expected.radius_m + expected.limb_m).max(T::one()))
 }
 
 /// Returns the logarithm of the likelihood ratio of a direction. `against` is the likelihood of an edge that may give
@@ -165,7 +158,7 @@ impl<T: Real> Looks<T> {
         let expected = case.expected;
         let (altitude_m, _) = expected.altitude_and_sigma_m();
         let looks = Self {
-            light: Light { by_m: angle_by_m(case), scale_height_m: expected.scale_height_m, sky: sky.median },
+            light: Light { by_m: case.cos_by_m(), scale_height_m: expected.scale_height_m, sky: sky.median },
             shows_air: true,
             is_above_layer: altitude_m > expected.scale_height_m * T::from_f64(LAYER_SCALE_HEIGHTS),
         };
