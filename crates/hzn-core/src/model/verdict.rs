@@ -80,7 +80,8 @@ verdicts! {
     /// aurora, or it cannot be told from one that does, as in an overexposed picture of the day that blooms; so the
     /// picture has no answer.
     Glow = 23, "glow";
-    /// The brightness hardly changes across the fitted limb: the edge is a contour line of light that fades slowly.
+    /// The brightness hardly changes across the fitted limb: the edge is a contour line of light that fades slowly. Or
+    /// it is one in the air above the limb.
     Faint = 24, "faint";
     /// The time and the position of the prior say that it is night: the Sun lights no part of the limb.
     Night = 25, "night";

@@ -354,7 +354,7 @@ fn an_edge_in_the_air_above_the_limb_is_no_limb() {
         if level <= 20 {
             assert!(answer.is_none() && without.is_some_and(|km| km > 5.0), "threshold {level}: {without:?} km");
         } else {
-            assert!(answer == without && answer.is_some_and(|km| km < 5.0), "threshold {level}: {answer:?} km");
+            assert!(answer == without && answer.is_some_and(|km| km < 7.5), "threshold {level}: {answer:?} km");
         }
     }
 }

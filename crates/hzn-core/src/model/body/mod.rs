@@ -5,6 +5,7 @@ mod azimuth;
 mod band;
 mod band_table;
 mod bounds;
+mod clipped;
 mod expected;
 mod kind;
 mod limb;

@@ -20,8 +20,8 @@ const ASIDE_PX: f64 = 10.0;
 const PART_OF_DISC: f64 = 0.125;
 /// Distance on both sides at which the light of the air is compared, in scale heights.
 ///
-/// An edge point is at half of the light of its limb. Above the limb the light falls by e over one scale height, so that
-/// an edge anywhere above it has e⁻³ = 1/20 of the light three scale heights below, however high it is.
+/// An edge point is at half of the light of its limb. Above the limb the light falls by e over one scale height. An
+/// edge there has e⁻³ = 1/20 of the light three scale heights below, however high it is.
 const SCALE_HEIGHTS: f64 = 3.0;
 /// Smallest light at an edge, as a part of that below: in the middle between the two, in the logarithm.
 const LEAST_LIGHT: f64 = 0.158;
@@ -30,8 +30,8 @@ const LEAST_SCALE_HEIGHT_PX: f64 = 1.2;
 /// Fewest places at which both sides must be visible.
 const LEAST: usize = 3;
 
-/// Refuses a limb whose step of the brightness is below the least contrast of an edge point, and an edge in the light of
-/// the air above a limb. A picture that shows too little of both sides is no evidence.
+/// Refuses a limb whose step of the brightness is below the least contrast of an edge point, and an edge in the air
+/// above a limb. A picture that shows too little of both sides is no evidence.
 ///
 /// Of a picture that came row by row, only lit and dark pixels are left. Where bands are allowed, the inside of the
 /// limb may be as dark as the sky.
