@@ -22,9 +22,6 @@ const DEFAULT_SIGMA_KM: f64 = 2.0 * MAX_SIGMA_KM;
 /// Floor of the slow part of the errors along an edge and thus of its common shift, in pixels: the default of
 /// `covariance.sigma_px`. Blur and threshold move the middle of an edge by fractions of a pixel, even if it is smooth.
 const MIN_SHIFT_PX: f64 = 0.1;
-/// The same for a sunlit limb whose profile is no wider than a pixel: the default of `covariance.bias_px`. The body
-/// becomes brighter inwards, so that the edge of a blurred limb lies outside of the true one, in every picture.
-const MIN_NARROW_SHIFT_PX: f64 = 0.3;
 /// Smallest common bend of the edges, as a part of their shift. It is an assumption: what shifts all edges may change
 /// along them by half, and not be visible in the residuals. On the nine flights of `rocket`, `rocket-clean` and
 /// `horace-wide` in `cargo xtask reproduce defaults`, bends with an RMS of 0.05 px explain the errors of the limb
@@ -73,8 +70,8 @@ pub struct Height {
     /// The height that clipping adds to a limb all of which is clipped, with its 1-sigma, in kilometres; `None` if no
     /// picture is clipped.
     pub clipped_km: Option<[f64; 2]>,
-    /// Part from a shift of all edges by the slow part of the residuals, at least [`Edge::min_shift_px`]. Threshold and
-    /// blur cause it, and it is the same in every picture.
+    /// Part from a shift of all edges by the slow part of the residuals, at least 0.1 px. Threshold and blur cause it,
+    /// and it is the same in every picture.
     pub shift_km: f64,
     /// Part from a bend that all edges have in common, which the fit takes for another height. It is assumed to be as
     /// strong as the next shapes along the edge in the mean of the residuals.
@@ -121,11 +118,8 @@ pub struct Edge {
     /// Correlation length of the slow part, in pixels: L, and at least the length that the sensor assumes without a
     /// calibration.
     pub slow_px: f64,
-    /// 1-sigma of a common shift of all points of an edge, in pixels: the RMS of the slow part, at least
-    /// [`Self::min_shift_px`].
+    /// 1-sigma of a common shift of all points of an edge, in pixels: the RMS of the slow part, at least 0.1.
     pub bias_px: f64,
-    /// Smallest common shift, in pixels: 0.1, or 0.3 for a sunlit limb whose profile is no wider than a pixel.
-    pub min_shift_px: f64,
     /// 1-sigma of a common tilt of an edge at its ends, in pixels. The fit takes a tilt for another direction, so that
     /// the residuals do not show it; its RMS is assumed to be that of the shift.
     pub tilt_px: f64,
@@ -199,7 +193,7 @@ impl Calibration {
         }
         let vague = |sigma_km: f64| Refusal::TooVague { sigma_km, max_km: MAX_SIGMA_KM, pictures: consistent.len() };
         let profile = fit_profile(&consistent, clipped_km).ok_or(vague(f64::INFINITY))?;
-        let edge = combine_edges(&consistent, find_min_shift_px(body, &profile, &consistent));
+        let edge = combine_edges(&consistent);
         let height = combine_heights(&profile, &consistent, &edge);
         if height.statistical_km > MAX_SIGMA_KM {
             return Err(vague(height.statistical_km));
@@ -368,23 +362,16 @@ fn weighted_mean(profile: &Profile, sightings: &[&Sighting], value: &dyn Fn(&Sig
     sum / weights
 }
 
-/// Returns the smallest common shift of the edges, in pixels. The profile of a limb is as wide as the heights of limbs
-/// differ.
-fn find_min_shift_px(body: &body::Config, profile: &Profile, sightings: &[&Sighting]) -> f64 {
-    let is_narrow = weighted_mean(profile, sightings, &|s| s.pixel_km) > DEFAULT_SIGMA_KM;
-    if is_narrow && body.is_seen_in_sunlight() && has_air(body) { MIN_NARROW_SHIFT_PX } else { MIN_SHIFT_PX }
-}
-
 /// Computes sigma and length, the slow part, and the most likely (L, ν) of all pictures together, each picture with its
 /// own σ.
-fn combine_edges(sightings: &[&Sighting], min_shift_px: f64) -> Edge {
+fn combine_edges(sightings: &[&Sighting]) -> Edge {
     let n = sightings.len() as f64;
     let cost = |i: usize, j: usize| sightings.iter().map(|s| s.scores[i][j].minus_two_ln_likelihood).sum::<f64>();
     let models = (0..LENGTHS_PX.len()).flat_map(|i| (0..WHITE.len()).map(move |j| (i, j)));
     let (i, j) = models.min_by(|a, b| cost(a.0, a.1).total_cmp(&cost(b.0, b.1))).unwrap_or_default();
     let rms_px = (sightings.iter().map(|s| s.rms_px * s.rms_px).sum::<f64>() / n).sqrt();
     let arc_px = sightings.iter().map(|s| s.arc_px).sum::<f64>() / n;
-    let bias_px = slow::sigma_px(sightings.iter().map(|s| s.slow_px2), rms_px).max(min_shift_px);
+    let bias_px = slow::sigma_px(sightings.iter().map(|s| s.slow_px2), rms_px).max(MIN_SHIFT_PX);
     Edge {
         sigma_px: rms_px.max(MIN_SIGMA_PX),
         correlation_px: median(sightings.iter().map(|s| s.correlation_px)),
@@ -393,7 +380,6 @@ fn combine_edges(sightings: &[&Sighting], min_shift_px: f64) -> Edge {
         slow_px: LENGTHS_PX[i].max(edge::window_px(arc_px)),
         white_px: (rms_px * rms_px - bias_px * bias_px).max(0.0).sqrt(),
         bias_px,
-        min_shift_px,
         tilt_px: bias_px * TILT_END_PER_RMS,
     }
 }

@@ -42,8 +42,6 @@ pub struct Sighting {
     /// is larger than the size of a pixel at the limb. Pixels away from the middle are finer, so the shift looks like
     /// a bend.
     pub km_per_px: f64,
-    /// Size of a pixel at the limb, in kilometres.
-    pub(super) pixel_km: f64,
     /// Change of the limb height by a bend of the whole edge with an RMS of one pixel, in kilometres.
     pub km_per_bend_px: f64,
     /// Change of the limb height per relative change of the focal length, in kilometres, for a limb of the height that
@@ -136,7 +134,6 @@ impl Sighting {
             sigma_km: by_cos_m.abs() * variance_cos.sqrt() / 1e3,
             radius_sigma_km: geometry.radius_sigma_m / 1e3,
             km_per_px: by_cos_m.abs() * cone.cos_per_px().max(cone.change_of_cos(|_| 1.0).abs()) / 1e3,
-            pixel_km: by_cos_m.abs() * cone.cos_per_px() / 1e3,
             km_per_bend_px: by_cos_m.abs() * cone.change_of_cos(|row| bend::bend_shape(row.along)).abs() / 1e3,
             shapes_px: bend::shapes_px(&cone),
             slow_px2: slow::variance_px2(&cone),

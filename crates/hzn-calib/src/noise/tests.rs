@@ -433,17 +433,3 @@ fn of_several_bodies_the_earth_gets_its_own_noise() {
     let wide = super::config_for_calibration(&read).unwrap();
     assert_eq!((wide.body.kind, wide.bodies.len(), wide.body.limb_height_sigma_km), (Kind::EarthSphere, 0, 30.0));
 }
-
-/// Blur moves the edge of a limb that is narrower than a pixel, in all pictures alike.
-#[test]
-fn a_narrow_limb_may_be_shifted_by_more() {
-    let floor_px = |width: u32, sunlit: Option<bool>| {
-        let focal_px = f64::from(width) / 120f64.to_radians();
-        let config = camera::Config::ideal(Model::Equidistant, width as u16, width as u16, focal_px);
-        let sightings = flight_through(config, 16, 18.7, 0.0, Noise(0.02, 10.0, 0.8), 5);
-        let edge = Calibration::new(&body::Config { sunlit, ..earth() }, &sightings).unwrap().edge;
-        assert!(edge.bias_px >= edge.min_shift_px, "{edge:?}");
-        edge.min_shift_px
-    };
-    assert_eq!([floor_px(960, None), floor_px(240, None), floor_px(240, Some(false))], [0.1, 0.3, 0.1]);
-}

@@ -27,8 +27,8 @@ pub fn lines(calibration: &Calibration, pictures: &str, camera: &Config) -> Vec<
         (
             "",
             format!(
-                "{:.2} km for a common shift of all edges by the slow part of their errors, at least {} px",
-                h.shift_km, e.min_shift_px
+                "{:.2} km for a common shift of all edges by the slow part of their errors, at least 0.1 px",
+                h.shift_km
             ),
         ),
         ("", format!("{:.2} km for a bend that all edges share", h.bend_km)),

@@ -99,10 +99,7 @@ fn limb_lines(calibration: &Calibration, source: &str) -> Vec<Line> {
     let mut parts = vec![
         format!("{:.2} km from edge noise over all pictures", h.statistical_km),
         format!("{:.2} km from the scatter between them", h.scatter_km),
-        format!(
-            "{:.2} km from a shift of all edges by the slow part of their errors, at least {} px",
-            h.shift_km, calibration.edge.min_shift_px
-        ),
+        format!("{:.2} km from a shift of all edges by the slow part of their errors, at least 0.1 px", h.shift_km),
         format!("{:.2} km from a bend that all edges have in common", h.bend_km),
     ];
     if h.clipping_km > 0.0 {
@@ -157,11 +154,9 @@ fn noise_lines(calibration: &Calibration) -> Vec<Line> {
         Line {
             key: "bias_px",
             value: round_to_written_digits(e.bias_px).into(),
-            why: format!(
-                "residuals do not show a common shift of all points; it is assumed to be equal to the RMS of their \
-                 slow part, and at least {} px",
-                e.min_shift_px
-            ),
+            why: "residuals do not show a common shift of all points; it is assumed to be equal to the RMS of their \
+                  slow part, and at least 0.1 px"
+                .into(),
         },
         Line {
             key: "tilt_px",
