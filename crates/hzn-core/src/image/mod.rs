@@ -10,6 +10,7 @@ mod grey;
 mod indirect;
 mod layout;
 mod pixels;
+mod profile;
 pub mod region;
 mod sample;
 #[cfg(test)]
@@ -22,5 +23,6 @@ pub use grey::Grey;
 pub use indirect::Indirect;
 pub use layout::{ImageError, Layout};
 pub use pixels::{Pixels, StreamedPoint};
+pub(crate) use profile::{Profile, Profiles};
 pub use sample::Sample;
 pub use view::ImageView;

@@ -1,5 +1,6 @@
 //! The interface between a picture and the pipeline.
 
+use super::Profile;
 use crate::geometry::block::Lit;
 
 /// The input of the pipeline: one brightness per pixel.
@@ -87,12 +88,20 @@ pub struct StreamedPoint {
     pub(crate) clipped: bool,
     /// Whether one of its plateaus was not within the rows in memory.
     pub(crate) cut: bool,
+    /// Width and contrast of the edge at the point.
+    pub(crate) profile: Profile,
 }
 
 impl StreamedPoint {
     /// No point was found, because its search left the rows in memory.
-    pub(crate) const LOST: Self =
-        Self { towards_dark_px: f32::NAN, lit: Lit::Right, fallback: false, clipped: false, cut: true };
+    pub(crate) const LOST: Self = Self {
+        towards_dark_px: f32::NAN,
+        lit: Lit::Right,
+        fallback: false,
+        clipped: false,
+        cut: true,
+        profile: Profile { width: 0, contrast: 0 },
+    };
 }
 
 impl<P: Pixels> Pixels for &P {

@@ -33,7 +33,31 @@ pub(crate) struct Curve<T> {
     gamma: T,
 }
 
+/// Width of the limb by day in counts that are proportional to the light, in scale heights. Its light is
+/// 1 − exp(−e^(−h/H)), which has the slope ln 2/2 at half of it.
+const LIMB_WIDTH: f64 = 2.0 / core::f64::consts::LN_2;
+/// The same at half of the counts of sRGB: the widest of the usual curves, if the tone is unknown.
+const LIMB_WIDTH_UNKNOWN: f64 = 4.9;
+
+/// Returns the width of the limb by day in the counts of this tone, in scale heights: its whole step over the slope
+/// where the edge is found.
+pub(crate) fn limb_width<T: Real>(tone: Option<Tone>) -> T {
+    match tone.map(|tone| (tone, tone.curve::<T>())) {
+        Some((Tone::Linear, _)) => T::from_f64(LIMB_WIDTH),
+        Some((_, Some(curve))) => T::from_f64(LIMB_WIDTH) / curve.slope_at_half(),
+        _ => T::from_f64(LIMB_WIDTH_UNKNOWN),
+    }
+}
+
 impl<T: Real> Curve<T> {
+    /// Returns the slope of the counts by the light at half of the light, both as parts of the largest.
+    fn slope_at_half(&self) -> T {
+        // c = (1 + offset) L^(1/γ) − offset
+        let per = T::one() / self.gamma;
+        let root = ((T::one() - per) * T::from_f64(core::f64::consts::LN_2)).exp();
+        (T::one() + self.offset) * per * root
+    }
+
     /// Returns the light of `counts` as a multiple of the light of `reference`. Both are fractions of full scale.
     pub(crate) fn light_over(&self, counts: T, reference: T) -> T {
         (self.gamma * ((counts + self.offset) / (reference + self.offset)).ln()).exp()
@@ -224,6 +248,25 @@ impl<'de> serde::Deserialize<'de> for Tone {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_limb_is_as_wide_as_its_slope_says() {
+        let srgb = |light: f64| 1.055 * libm::pow(light, 1.0 / 2.4) - 0.055;
+        let bt709 = |light: f64| 1.099 * libm::pow(light, 0.45) - 0.099;
+        // The inverse of the slope of the counts by the height, in scale heights, where the edge is.
+        let width = |counts: &dyn Fn(f64) -> f64, light: f64| {
+            let height = |light: f64| -libm::log(-libm::log(1.0 - light));
+            let step = 1e-5;
+            (height(light - step) - height(light + step)).abs() / (counts(light + step) - counts(light - step))
+        };
+        let of = |tone| limb_width::<f64>(tone);
+        assert!((of(Some(Tone::Linear)) - width(&|light| light, 0.5)).abs() < 1e-3);
+        assert!((of(Some(Tone::Srgb)) - width(&srgb, 0.5)).abs() < 1e-3);
+        assert!((of(Some(Tone::Bt709)) - width(&bt709, 0.5)).abs() < 1e-3);
+        let half_of_counts = Tone::Srgb.light_at_half().unwrap();
+        assert!((of(None) - width(&srgb, half_of_counts)).abs() < 0.02, "{}", width(&srgb, half_of_counts));
+        assert_eq!(of(Some(Tone::Unknown)), of(None));
+    }
 
     #[test]
     fn half_of_the_counts_is_less_than_half_of_the_light() {

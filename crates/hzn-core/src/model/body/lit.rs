@@ -60,6 +60,13 @@ impl<T> Expected<T> {
 }
 
 impl<T: Real> Expected<T> {
+    /// Returns whether the Sun may be below the horizon at a part of the limb: its elevation at the point below the
+    /// camera is unknown, or less than the dip.
+    pub(crate) fn may_have_low_sun(&self) -> bool {
+        let dip = T::from_f64(core::f64::consts::FRAC_PI_2) - self.half_angle_rad();
+        self.sun_elevation_rad.is_none_or(|elevation| elevation < dip)
+    }
+
     /// Returns whether the Sun is known to light no part of the limb: it is more than dip + 18° below the horizon of
     /// the point below the camera.
     ///

@@ -1,24 +1,30 @@
 //! Edge points by the border pixel at which they were measured, in the order of the rows.
 
 use crate::geometry::block::Lit;
-use crate::image::StreamedPoint;
+use crate::image::{Profile, StreamedPoint};
 
 /// An edge point: the column of its border pixel, and the distance from there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Point {
     towards_dark_px: f32,
     x: u16,
-    lit: Lit,
-    /// Sum of the flags [`FALLBACK`], [`CUT`] and [`CLIPPED`] that apply.
+    /// The lit side in the lowest two bits, and the contrast of the profile.
+    side: u8,
+    /// Sum of the flags [`FALLBACK`], [`CUT`] and [`CLIPPED`] that apply, and the width of the profile above them.
     marks: u8,
 }
 
 const FALLBACK: u8 = 1;
 const CUT: u8 = 2;
 const CLIPPED: u8 = 4;
+/// Number of bits of the flags, and of the lit side.
+const FLAGS: u8 = 3;
+const SIDE: u8 = 2;
+/// The lit sides by number.
+const SIDES: [Lit; 4] = [Lit::Right, Lit::Left, Lit::Below, Lit::Above];
 
 impl Point {
-    pub(super) const NONE: Self = Self { towards_dark_px: 0.0, x: 0, lit: Lit::Right, marks: 0 };
+    pub(super) const NONE: Self = Self { towards_dark_px: 0.0, x: 0, side: 0, marks: 0 };
 }
 
 /// The points of the rows so far, in borrowed memory. When the memory is full, every second pixel is left out, both of
@@ -111,7 +117,10 @@ impl<'a> Points<'a> {
         if let Some(place) = self.points.get_mut(self.used) {
             let marks =
                 u8::from(found.fallback) * FALLBACK + u8::from(found.cut) * CUT + u8::from(found.clipped) * CLIPPED;
-            *place = Point { towards_dark_px: found.towards_dark_px, x, lit: found.lit, marks };
+            let Profile { width, contrast } = found.profile;
+            let side = found.lit as u8 + (contrast << SIDE);
+            let marks = marks + (width << FLAGS);
+            *place = Point { towards_dark_px: found.towards_dark_px, x, side, marks };
             self.used += 1;
         }
     }
@@ -131,8 +140,15 @@ impl<'a> Points<'a> {
         let row = self.points.get(start..at(y))?;
         // A row is searched by halves because its points are sorted by column; a clouded row may have hundreds.
         let found = row.get(row.partition_point(|p| p.x < x)).filter(|p| p.x == x)?;
-        let Point { towards_dark_px, lit, marks, .. } = *found;
+        let Point { towards_dark_px, side, marks, .. } = *found;
         let has = |mark: u8| marks & mark > 0;
-        Some(StreamedPoint { towards_dark_px, lit, fallback: has(FALLBACK), clipped: has(CLIPPED), cut: has(CUT) })
+        Some(StreamedPoint {
+            towards_dark_px,
+            lit: SIDES[usize::from(side & 3)],
+            fallback: has(FALLBACK),
+            clipped: has(CLIPPED),
+            cut: has(CUT),
+            profile: Profile { width: marks >> FLAGS, contrast: side >> SIDE },
+        })
     }
 }

@@ -158,7 +158,8 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
         if !self.work.try_spend(used as u32 * work::FIT + work::GATES) {
             return None;
         }
-        let fit = fit::fit(blocks, &consensus, expected, camera, threshold.px, &config.fit, self.noise)?;
+        let mut fit = fit::fit(blocks, &consensus, expected, camera, threshold.px, &config.fit, self.noise)?;
+        (fit.profiles, fit.tone) = (points.profiles, config.input.tone);
         outcome.inliers = fit.inliers;
         outcome.rms_px = fit.rms_px;
         for place in 0..points.count {
@@ -203,6 +204,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             taken: self.taken,
             blocks,
             points: points.count,
+            fallback: points.fallback,
             min_inlier_share: self.min_inlier_share(),
             raised: threshold.factor,
             camera,

@@ -133,6 +133,20 @@ impl<T: Real> Row<T> {
     pub(super) fn w(&self) -> T {
         self.w
     }
+    /// Returns the number of the point along the edge.
+    pub(super) fn place(&self) -> usize {
+        self.place
+    }
+    /// Returns how many pixels across the limb one pixel along the axis of its profile is.
+    pub(super) fn across_by_axis(&self) -> T {
+        let [gu, gv] = self.gradient;
+        gu.abs().max(gv.abs()) / self.g2.sqrt()
+    }
+    /// Returns whether the Sun in the direction `sun` is above the horizon of the point.
+    pub(super) fn is_in_sunlight(&self, sun: &V3<T>, fit: &Fit<T>) -> bool {
+        // The surface normal is (s cos α − e)/sin α.
+        self.s.dot(sun) * fit.c > fit.e.dot(sun)
+    }
     /// Returns cos φ and sin φ of the azimuth φ about the axis.
     pub(super) fn azimuth(&self) -> [T; 2] {
         let per = T::one() / (self.x * self.x + self.y * self.y).max(T::from_f64(1e-20)).sqrt();

@@ -16,6 +16,7 @@ pub(crate) mod consider;
 mod elliptic;
 mod fusion;
 mod gauss_markov;
+mod light;
 mod noise;
 pub(crate) mod position;
 pub mod reml;
@@ -130,7 +131,8 @@ fn add_to<T: Real>(
         p.common += more;
         add(Term::Weather, &more);
     }
-    uneven::add_terms(fit, expected, shown, |term, more| {
+    let light = light::covariance(blocks, fit, expected);
+    uneven::add_terms(fit, expected, shown, light, |term, more| {
         p.late += *more;
         add(term, more);
     });

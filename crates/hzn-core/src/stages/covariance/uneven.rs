@@ -30,10 +30,18 @@ const AZIMUTHS: [[f64; 2]; 4] = {
 };
 
 /// Calls `add` with each term and its covariance of (δ₁₂, δc). `shown` is the variance of the axis, rad², that the
-/// residuals of the picture already add for a tilt and a bend.
-pub(super) fn add_terms<T: Real>(fit: &Fit<T>, expected: &Expected<T>, shown: T, mut add: impl FnMut(Term, &M3<T>)) {
+/// residuals of the picture already add for a tilt and a bend. `light` is the covariance from light that changes along
+/// the edge.
+pub(super) fn add_terms<T: Real>(
+    fit: &Fit<T>,
+    expected: &Expected<T>,
+    shown: T,
+    light: Option<M3<T>>,
+    mut add: impl FnMut(Term, &M3<T>),
+) {
     add(Term::LimbTilt, &tilt(expected));
-    if let Some(p) = low_sun(fit, expected, shown) {
+    let rise = low_sun(fit, expected, shown);
+    if let Some(p) = rise.into_iter().chain(light).reduce(|a, b| a + b) {
         add(Term::LowSun, &p);
     }
 }

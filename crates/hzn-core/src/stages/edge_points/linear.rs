@@ -5,7 +5,7 @@ use super::point::{EdgePoint, orientation, point_off};
 use super::reads::{Around, Line};
 use crate::base::real::Real;
 use crate::geometry::pixel::Pixel;
-use crate::image::Pixels;
+use crate::image::{Pixels, Profile};
 use crate::model::observer::Observer;
 use crate::model::work;
 use crate::stages::contour::BinaryPicture;
@@ -57,8 +57,8 @@ pub(super) fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     // Sharp edges take this short way; on wide edges it would end before the plateaus, and the limb would move with the
     // light.
     if FREE && (2 * level < steep || line.at(FADED, 0).is_some_and(|v| 2 * v < level)) {
-        let Crossing { part, fallback, clipped, .. } = line.crossing(near.across(lit))?;
-        return Some(EdgePoint { point: point_off(p, (dx, dy), part), lit, fallback, clipped });
+        let Crossing { part, fallback, clipped, profile, .. } = line.crossing(near.across(lit))?;
+        return Some(EdgePoint { point: point_off(p, (dx, dy), part), lit, fallback, clipped, profile });
     }
     let (half, fifth) = (4 * level / steep.max(1), 3 * level / (2 * steep.max(1)));
     let step = half.min(fifth.max(4)).clamp(1, WIDEST);
@@ -71,9 +71,9 @@ pub(super) fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
         *extra_cost += binary.region.checks_cost(p.x, p.y, reach);
         locate_in_steps::<T, P, O, false>(binary, p, (dx, dy), step, here)?
     };
-    let WideCrossing { off, fallback, clipped, .. } =
+    let WideCrossing { off, fallback, clipped, profile, .. } =
         if found.rising { recentre_profile(binary, p, (dx, dy), step, found, extra_cost) } else { found };
-    Some(EdgePoint { point: point_off(p, (dx, dy), off), lit, fallback, clipped })
+    Some(EdgePoint { point: point_off(p, (dx, dy), off), lit, fallback, clipped, profile })
 }
 
 /// Largest number of times that a profile is read again about its crossing.
@@ -161,6 +161,7 @@ struct WideCrossing<T> {
     off: T,
     fallback: bool,
     clipped: bool,
+    profile: Profile,
     /// Whether the lit side did not level off within reach.
     rising: bool,
 }
@@ -177,13 +178,13 @@ fn locate_in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
 ) -> Option<WideCrossing<T>> {
     let around = Around::<T, P, O, FREE>::new(binary, p);
     let line = Line::new(&around, (dx, dy), step);
-    let Crossing { part, mid2, fallback, clipped, rising } =
+    let Crossing { part, mid2, fallback, clipped, profile, rising } =
         line.crossing([line.smoothed(-1)?, here, line.smoothed(1)?])?;
     let coarse = part * T::from_i32(step);
     // The profile is curved within a step. The crossing is therefore interpolated again over half a step around it.
     let half = step / 2;
     if half == 0 {
-        return Some(WideCrossing { off: coarse, fallback, clipped, rising });
+        return Some(WideCrossing { off: coarse, fallback, clipped, profile, rising });
     }
     let pixels = Line::new(&around, (dx, dy), 1);
     let whole = (coarse + T::from_i32(REACH * WIDEST)).to_i32() - REACH * WIDEST;
@@ -192,5 +193,5 @@ fn locate_in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let fine = T::from_i32(k) + T::from_i32(half * (2 * a - mid2)) / T::from_i32((2 * (a - b)).max(1));
     // In noise the short interval may have hardly any slope; its crossing would then lie anywhere.
     let off = if (fine - coarse).abs() <= T::from_i32(half) { fine } else { coarse };
-    Some(WideCrossing { off, fallback, clipped, rising })
+    Some(WideCrossing { off, fallback, clipped, profile, rising })
 }

@@ -27,7 +27,7 @@ mod zernike;
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 use crate::geometry::pixel::Pixel;
-use crate::image::{Pixels, StreamedPoint};
+use crate::image::{Pixels, Profiles, StreamedPoint};
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
 use linear::{MARGIN, is_clear, linear};
@@ -51,6 +51,8 @@ pub(crate) struct Points {
     /// In a picture that arrives row by row: number of points, also of lost ones, with plateaus outside of the rows
     /// that are kept.
     pub(crate) cut: u32,
+    /// Width and contrast of the edge in each third of it.
+    pub(crate) profiles: Profiles,
 }
 
 /// Fills `blocks` with the edge points of a border, thinned evenly to `keep_points`. Empty lanes have weight 0. The
@@ -72,7 +74,9 @@ pub(crate) fn locate_edge_points<T: Real, P: Pixels, O: Observer<T>>(
     let mut made = Points::default();
     let mut place = 0;
     // The first point lies half a step from the end, so that the points are centred on the edge.
-    for &pixel in border.iter().skip(every / 2).step_by(every) {
+    let pixels = border.iter().skip(every / 2).step_by(every);
+    let all = pixels.len().max(1);
+    for (number, &pixel) in pixels.enumerate() {
         if made.extra_cost >= most_extra {
             break;
         }
@@ -81,7 +85,7 @@ pub(crate) fn locate_edge_points<T: Real, P: Pixels, O: Observer<T>>(
             made.cut += u32::from(found.is_some_and(|f| f.cut));
             found.filter(|f| !f.towards_dark_px.is_nan()).map(|f| {
                 let point = point_off(pixel, f.lit.towards_dark(), T::from_f64(f.towards_dark_px.into()));
-                EdgePoint { point, lit: f.lit, fallback: f.fallback, clipped: f.clipped }
+                EdgePoint { point, lit: f.lit, fallback: f.fallback, clipped: f.clipped, profile: f.profile }
             })
         } else {
             locate(binary, config, pixel, &mut made.extra_cost)
@@ -95,6 +99,7 @@ pub(crate) fn locate_edge_points<T: Real, P: Pixels, O: Observer<T>>(
         }
         block.set_point(place % LANES, found.point, found.lit);
         binary.observer.point(candidate, found.point);
+        made.profiles.add(3 * number / all, place, found.profile);
         place += 1;
         made.count += 1;
         made.fallback += u32::from(found.fallback);
@@ -132,12 +137,12 @@ pub(crate) fn locate_streamed_point<T: Real, P: Pixels, O: Observer<T>>(
     config: &Config,
     p: Pixel,
 ) -> Option<StreamedPoint> {
-    let EdgePoint { point, lit, fallback, clipped } = locate(binary, config, p, &mut 0)?;
+    let EdgePoint { point, lit, fallback, clipped, profile } = locate(binary, config, p, &mut 0)?;
     // The difference is exact, and the sum that restores the point from it is exact, too.
     let (dx, dy) = lit.towards_dark();
     let off =
         (point.u - T::from_i32(p.x.into())) * T::from_i32(dx) + (point.v - T::from_i32(p.y.into())) * T::from_i32(dy);
-    Some(StreamedPoint { towards_dark_px: off.to_f64() as f32, lit, fallback, clipped, cut: false })
+    Some(StreamedPoint { towards_dark_px: off.to_f64() as f32, lit, fallback, clipped, cut: false, profile })
 }
 
 fn half_pixel<T: Real, P: Pixels, O: Observer<T>>(

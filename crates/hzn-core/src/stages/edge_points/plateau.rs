@@ -2,7 +2,7 @@
 
 use super::reads::{Around, Line, UNSEEN, Walk};
 use crate::base::real::Real;
-use crate::image::Pixels;
+use crate::image::{Pixels, Profile};
 use crate::model::observer::Observer;
 use crate::model::tone::Curve;
 
@@ -23,6 +23,8 @@ pub(super) struct Crossing<T> {
     pub(super) fallback: bool,
     /// Whether the lit side is clipped at full scale.
     pub(super) clipped: bool,
+    /// Width and contrast of the edge.
+    pub(super) profile: Profile,
     /// Whether the lit side did not level off within reach.
     pub(super) rising: bool,
 }
@@ -141,7 +143,9 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         let part = T::from_i32(k) + T::from_i32(2 * a - mid2) / T::from_i32(2 * (a - b));
         let full = i32::from(binary.picture.full_scale());
         let clipped = bright >= 4 * (full - full / CLIPPED_PART);
-        Some(Crossing { part, mid2, fallback, clipped, rising: inner <= -REACH })
+        let (dx, dy) = self.step;
+        let profile = Profile::new(contrast, a - b, dx.abs() + dy.abs());
+        Some(Crossing { part, mid2, fallback, clipped, profile, rising: inner <= -REACH })
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::base::real::Real;
 use crate::geometry::block::Lit;
 use crate::geometry::pixel::{ImagePoint, Pixel};
+use crate::image::Profile;
 
 /// An edge point.
 pub(super) struct EdgePoint<T> {
@@ -13,12 +14,14 @@ pub(super) struct EdgePoint<T> {
     pub(super) fallback: bool,
     /// Whether the lit side is clipped at full scale, so that half of its brightness is not half of the light.
     pub(super) clipped: bool,
+    /// Width and contrast of the edge at the point.
+    pub(super) profile: Profile,
 }
 
 impl<T> EdgePoint<T> {
     /// Makes a point of a method that has no mid-level.
     pub(super) fn plain(point: ImagePoint<T>, lit: Lit) -> Self {
-        Self { point, lit, fallback: false, clipped: false }
+        Self { point, lit, fallback: false, clipped: false, profile: Profile::default() }
     }
 }
 

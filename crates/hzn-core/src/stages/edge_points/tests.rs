@@ -174,10 +174,13 @@ fn thinning_keeps_the_whole_edge() {
     let binary = BinaryPicture::new(&grey, &region, 120, &Unobserved);
     let border: Vec<Pixel> = (20..80).map(|x| Pixel { x, y: 50 }).collect();
     let mut blocks = [Block::default(); 2];
-    assert_eq!(
-        locate_edge_points(&binary, &config, &border, 0, &mut blocks, u32::MAX),
-        Points { count: 15, ..Points::default() }
-    );
+    let made = locate_edge_points(&binary, &config, &border, 0, &mut blocks, u32::MAX);
+    assert_eq!(made, Points { count: 15, profiles: made.profiles, ..Points::default() });
+    // The edge falls by 200 counts over two pixels.
+    for (part, place) in made.profiles.means::<f64>().unwrap().into_iter().zip([2.0, 7.0, 12.0]) {
+        assert_eq!(part.place, place);
+        assert!((part.ln_width.exp() - 2.0).abs() < 0.3 && (part.ln_contrast.exp() - 200.0).abs() < 20.0, "{part:?}");
+    }
     let (first, last) = (blocks[0].point(0).u, blocks[1].point(6).u);
     assert_eq!((first, last), (22.0, 78.0));
 }

@@ -5,6 +5,8 @@ use super::sums::Sums;
 use crate::base::linalg::{V3, unit};
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES, sum};
+use crate::image::Profiles;
+use crate::model::tone::Tone;
 
 /// A fitted cone.
 #[derive(Debug, Clone, Copy)]
@@ -32,6 +34,9 @@ pub(crate) struct Fit<T> {
     /// The elliptic cone of the methods that fit one. Its covariance is not the one of the normal equations. Read
     /// it by [`Self::quadric`].
     pub(crate) quadric: Option<Quadric<T>>,
+    /// Width and contrast of the edge, and the tone of the picture, which the caller of the fit fills in.
+    pub(crate) profiles: Profiles,
+    pub(crate) tone: Option<Tone>,
 }
 
 impl<T: Real> Fit<T> {
@@ -68,6 +73,8 @@ pub(super) fn count_points<T: Real>(blocks: &[Block<T>], cone: Cone<T>) -> Fit<T
         sums,
         mean,
         quadric: cone.quadric,
+        profiles: Profiles::default(),
+        tone: None,
     }
 }
 

@@ -29,6 +29,8 @@ pub(crate) struct Case<'a, T> {
     pub(crate) blocks: &'a [Block<T>],
     /// Number of edge points.
     pub(crate) points: u32,
+    /// Number of edge points at the threshold of the picture, because no local mid-level was found.
+    pub(crate) fallback: u32,
     /// Smallest part of the points that must be inliers; it is larger in a further look.
     pub(crate) min_inlier_share: f64,
     /// Factor by which the noise of the edge raises the threshold of the consensus; the largest RMS grows by the same

@@ -43,6 +43,7 @@ pub(super) fn refuse<T: Real, P: Pixels, O: Observer<T>>(
     if P::STREAMED || case.config.max_band >= 1.0 {
         return Ok(());
     }
+    has_contrast(case)?;
     let aside = T::from_f64(ASIDE_PX).min(disc_px(case.expected, case.camera) * T::from_f64(PART_OF_DISC));
     let (mut body, mut sky) = (Counts::new(), Counts::new());
     for place in places {
@@ -56,6 +57,12 @@ pub(super) fn refuse<T: Real, P: Pixels, O: Observer<T>>(
     }
     let [body, sky] = [&body, &sky].map(|all| i32::from(median::median_of_counts(all)));
     refuse_if(body - sky < binary.least_contrast || is_in_air(case, binary, places), Verdict::Faint)
+}
+
+/// Refuses an edge of which more than half of the points have no contrast of their own. They lie on a contour line of
+/// the brightness, which may be anywhere in a slow gradient.
+fn has_contrast<T: Real>(case: &Case<'_, T>) -> Result<(), Verdict> {
+    refuse_if(2 * case.fallback > case.points, Verdict::Faint)
 }
 
 /// Returns whether an edge lies in the light of the air above the limb. A threshold far below half of the body's light
@@ -105,3 +112,17 @@ fn part_of_light<T: Real, P: Pixels, O: Observer<T>>(
 }
 
 type Counts = heapless::Vec<u16, MAX_PLACES>;
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::Limb;
+    use super::*;
+
+    #[test]
+    fn half_of_the_points_must_have_a_contrast_of_their_own() {
+        let limb = Limb::exact();
+        let with = |fallback: u32| has_contrast(&Case { fallback, ..limb.case() });
+        let half = limb.case().points / 2;
+        assert_eq!((with(0), with(half), with(half + 1)), (Ok(()), Ok(()), Err(Verdict::Faint)));
+    }
+}

@@ -5,16 +5,16 @@ use crate::base::real::Real;
 use crate::model::verdict::Verdict;
 
 /// Radius of a disc from which on `gates.max_rms_px` holds, in pixels. The limit of a smaller disc is smaller in
-/// proportion to its radius: with the default of 2 px it is 4.3 % of the radius.
+/// proportion to its radius: with the default of 1.7 px it is 4.3 % of the radius.
 ///
 /// The outline of a regular hexagon departs from its mean circle by 4.3 %: by (tan(a)/(a m²) − 1)^½ for sec θ along a
 /// half side, with a = π/6 and the mean m = ln(tan(π/3))/a. An outline that is no rounder than a hexagon is the corner
 /// of a chessboard or a patch of light, and no disc. The Earth from afar, lit in part, has up to 2.3 %, and 90 % of
 /// such limbs have up to 0.6 % (kind `far` of `tests/python/decoy_campaign.py`).
-pub(super) const FULL_RADIUS_PX: f64 = 46.5;
+const FULL_RADIUS_PX: f64 = 39.5;
 /// Smallest part of the limit: half a pixel of the default. Blur and sampling cause as much on an outline of a few
 /// pixels.
-const LEAST_PART: f64 = 0.25;
+const LEAST_PART: f64 = 0.3;
 
 /// Refuses an edge whose inliers are too far from the cone, for the picture or for the size of the disc.
 pub(super) fn refuse<T: Real>(case: &Case<'_, T>) -> Result<(), Verdict> {

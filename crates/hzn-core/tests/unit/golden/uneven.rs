@@ -1,6 +1,8 @@
 //! Compares the fit of a limb whose height changes along the edge with the error that the covariance predicts.
 
 use super::*;
+use crate::image::{Profile, Profiles};
+use crate::model::tone::Tone;
 use crate::stages::covariance::{ErrorBudget, Term};
 
 /// Azimuth of the Sun from the middle of the edge and its elevation below the camera, degrees.
@@ -27,6 +29,18 @@ fn fitted(
     expected: &Expected<f64>,
     half_angle: HalfAngle,
 ) -> (V3<f64>, f64, ErrorBudget<f64>) {
+    fitted_with(camera, points, e, expected, half_angle, Profiles::default())
+}
+
+/// Does the same for an edge with these profiles, in a picture with linear counts.
+fn fitted_with(
+    camera: &Camera<f64>,
+    points: &[(f64, f64)],
+    e: &UnitVec3<Cam, f64>,
+    expected: &Expected<f64>,
+    half_angle: HalfAngle,
+    profiles: Profiles,
+) -> (V3<f64>, f64, ErrorBudget<f64>) {
     let mut blocks = blocks(camera, points, e);
     let config = consensus::Config { threshold_px: 60.0, ..consensus::Config::default() };
     let (threshold, count) = (consensus::Threshold::from_config(&config), points.len() as u32);
@@ -34,7 +48,8 @@ fn fitted(
     let start = consensus::find(&mut blocks, count, expected, fx, threshold, &config, &mut work).unwrap();
     let estimate = fit::Config { half_angle, ..Default::default() };
     let noise = covariance::Config { tilt_px: 0.0, ..covariance::Config::given(0.1, 60.0) };
-    let fit = fit::fit(&mut blocks, &start, expected, camera, 60.0, &estimate, &noise).unwrap();
+    let mut fit = fit::fit(&mut blocks, &start, expected, camera, 60.0, &estimate, &noise).unwrap();
+    (fit.profiles, fit.tone) = (profiles, Some(Tone::Linear));
     let mut budget = ErrorBudget::new();
     covariance::fuse(&blocks, &fit, expected, &noise, &estimate, camera, Some(&mut budget)).unwrap();
     (fit.e, fit.c, budget)
@@ -111,4 +126,101 @@ fn an_elevation_alone_spreads_the_sun_over_all_azimuths() {
     assert_eq!([high.norm(), night.norm(), low_sun(&expected).norm()], [0.0; 3]);
     // The two sides are equally likely, so that nothing joins the directions towards the edge and along it.
     assert!(low.m12.abs() < 1e-3 * low.m11.max(low.m22), "{low}");
+}
+
+/// Moves points outwards, each by its pixels; `y_px` gets the number of the point and the number of all.
+fn moved(
+    camera: &Camera<f64>,
+    e: &V3<f64>,
+    points: &[(f64, f64)],
+    y_px: impl Fn(f64, f64, f64) -> f64,
+) -> Vec<(f64, f64)> {
+    let count = points.len() as f64;
+    let outwards = |&(u, v): &(f64, f64)| {
+        let ray = *camera.unproject(ImagePoint { u, v }).unwrap().v();
+        let farther = UnitVec3::assume_unit((ray - e * 1e-6).normalize());
+        let to = camera.project(&farther).unwrap();
+        let (du, dv) = (to.u - u, to.v - v);
+        let length = libm::hypot(du, dv);
+        (du / length, dv / length)
+    };
+    let all = points.iter().enumerate();
+    all.map(|(i, point)| {
+        let (du, dv) = outwards(point);
+        let y = y_px(i as f64, count, du.abs().max(dv.abs()));
+        (point.0 + y * du, point.1 + y * dv)
+    })
+    .collect()
+}
+
+/// Makes the profiles of an edge with so many points, from width and contrast in each third, as powers of two.
+fn profiles(count: usize, widths: [u8; 3], contrasts: [u8; 3]) -> Profiles {
+    let mut profiles = Profiles::default();
+    for place in 0..count {
+        let third = 3 * place / count;
+        profiles.add(third, place, Profile { width: 4 * widths[third], contrast: 4 * contrasts[third] });
+    }
+    profiles
+}
+
+/// The value at `i` of the parabola through three values in the middles of the thirds of `count` points.
+fn parabola(i: f64, count: f64, [first, middle, last]: [f64; 3]) -> f64 {
+    let t = (i + 0.5) / count * 3.0 - 1.5;
+    middle + (last - first) / 2.0 * t + ((first + last) / 2.0 - middle) * t * t
+}
+
+#[test]
+fn light_along_the_edge_moves_the_fit_as_the_covariance_says() {
+    for fx_px in [500.0, 1000.0] {
+        let (camera, e, expected) = scene(fx_px);
+        let points = limb(&camera, &e, expected.cos, 2.0);
+        let scale_px = 7.5e3 * expected.cos_per_m() / expected.sin * fx_px;
+        for (widths, contrasts) in
+            [([4, 5, 6], [5; 3]), ([6, 6, 6], [5; 3]), ([2, 2, 2], [4, 6, 8]), ([3; 3], [7, 5, 6])]
+        {
+            let mean = f64::from(contrasts.iter().sum::<u8>()) / 3.0;
+            let shift = |i: f64, count: f64, across: f64| {
+                let own_px = libm::hypot(2.885 * scale_px, 5.0);
+                let widths_px = widths.map(|log2| libm::exp2(f64::from(log2)) * across);
+                let wider = widths_px.map(|width| (width - own_px).max(0.0));
+                let ln = contrasts.map(|log2| (f64::from(log2) - mean) * core::f64::consts::LN_2);
+                let shifted = core::array::from_fn(|k| widths_px[k] * ln[k] / 2.0);
+                parabola(i, count, wider) + parabola(i, count, shifted)
+            };
+            let edge = moved(&camera, e.v(), &points, shift);
+            for half_angle in [HalfAngle::Free, HalfAngle::Known] {
+                let (axis, cos, _) = fitted(&camera, &edge, &e, &expected, half_angle);
+                let profiles = profiles(points.len(), widths, contrasts);
+                let (.., budget) = fitted_with(&camera, &points, &e, &expected, half_angle, profiles);
+                let free = half_angle == HalfAngle::Free;
+                let off = (axis - e.v()).norm().hypot(if free { cos - expected.cos } else { 0.0 });
+                let p = budget.fit_term(Term::LowSun) * 3.0;
+                let ratio = libm::sqrt(p.m11 + p.m22 + if free { p.m33 } else { 0.0 }) / off;
+                assert!((0.8..1.25).contains(&ratio), "{fx_px} {widths:?} {contrasts:?} {half_angle:?}: {ratio} {off}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_high_sun_has_no_light_that_changes() {
+    let (camera, e, expected) = scene(500.0);
+    let points = limb(&camera, &e, expected.cos, 2.0);
+    let profiles = profiles(points.len(), [4, 5, 6], [4, 6, 8]);
+    let light = |expected: &Expected<f64>| {
+        let (.., budget) = fitted_with(&camera, &points, &e, expected, HalfAngle::Free, profiles);
+        budget.fit_term(Term::LowSun).norm()
+    };
+    // The dip of the horizon is 20°.
+    let at = |deg: f64| light(&Expected { sun_elevation_rad: Some(deg.to_radians()), ..expected });
+    assert!(light(&expected) > 0.0 && at(19.0) > 0.0);
+    assert_eq!(at(66.0), 0.0);
+    let seen = |down: f64| {
+        light(&Expected { sun_seen: Some((V3::new(0.1, 0.1, 1.0) - e.v() * down).normalize()), ..expected })
+    };
+    assert_eq!(seen(20.0), 0.0);
+    assert!(seen(-1.0) > 0.0);
+    // Neither a thermal camera nor a body without air.
+    assert_eq!(light(&Expected { is_in_sunlight: false, ..expected }), 0.0);
+    assert_eq!(light(&Expected { scale_height_m: 0.0, ..expected }), 0.0);
 }
