@@ -7,7 +7,7 @@ use hzn_core::real::Real;
 use hzn_core::status::Status;
 use hzn_core::{Config, FlightHorizon, Horizon, HostHorizon, Prior, Report};
 use hzn_host::Compiled;
-use hzn_sim::{Globe, Scene};
+use hzn_sim::{Globe, Light, Scene};
 use nalgebra::{Matrix3, Vector3};
 
 /// Sensor of a workstation (f64) and sensor of a flight computer (f32), from one configuration.
@@ -72,13 +72,14 @@ impl Sensors {
 }
 
 /// Returns the prior that a navigation system would give for a scene: the altitude, for `earth` also the position, and
-/// no attitude.
+/// no attitude. A scene that is evenly lit has a high Sun.
 pub fn prior_of_scene<T: Real>(scene: &Scene) -> Prior<T> {
     let position_m = scene.pose.position_m;
     let altitude_m = Globe::new(&scene.body).altitude_m(position_m);
     Prior {
         altitude_m: Some(T::from_f64(altitude_m)),
         position_m: (scene.body.kind == Kind::Earth).then(|| position_m.map(T::from_f64)),
+        sun_elevation_rad: matches!(scene.light, Light::Full).then(|| T::from_f64(core::f64::consts::FRAC_PI_2)),
         ..Prior::default()
     }
 }

@@ -19,11 +19,11 @@ const TUMBLE: &str = "name = \"tumble\"\nutc = 2023-10-05T09:00:00Z\n[capture]\n
 fn with_rates(place: &Place, factor: f64) -> String {
     let row = |row: &Vec<(String, String)>| {
         let rates = ["rate_x", "rate_y", "rate_z"].map(|n| (factor * cell(row, n).parse::<f64>().unwrap()).to_string());
-        let told = ["file", "time_s", "x_km", "y_km", "z_km"].map(|name| cell(row, name));
+        let told = ["file", "time_s", "utc", "x_km", "y_km", "z_km"].map(|name| cell(row, name));
         format!("{},{}\n", told.join(","), rates.join(","))
     };
     let rows: String = place.rows("tumble/frames.csv").iter().map(row).collect();
-    place.write("rates.csv", format!("file,time_s,x_km,y_km,z_km,rate_x,rate_y,rate_z\n{rows}").as_bytes());
+    place.write("rates.csv", format!("file,time_s,utc,x_km,y_km,z_km,rate_x,rate_y,rate_z\n{rows}").as_bytes());
     place.run(&["run", "tumble", "--frames", "rates.csv", "-q", "-o", "r.csv", "--force"]).expect(0).err
 }
 

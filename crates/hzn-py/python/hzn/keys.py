@@ -270,7 +270,7 @@ class Gates(TypedDict, total=False):
     a third of the body's circumference if less."""
     max_rms_px: float
     """Largest weighted RMS distance of the inliers from the limb, px; where ``consensus.noise_sigma`` raises the
-    largest distance of an inlier, this limit is raised by the same factor. Values: above 0 px. Default: 1.7."""
+    largest distance of an inlier, this limit is raised by the same factor. Values: above 0 px. Default: 2.0."""
     max_half_angle_sigma: float
     """Largest difference between the fitted and the expected half-angle, in standard deviations. Values: above 0.
     Default: 3.0."""

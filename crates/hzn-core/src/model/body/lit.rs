@@ -60,9 +60,14 @@ impl<T> Expected<T> {
 }
 
 impl<T: Real> Expected<T> {
-    /// Returns whether the Sun may be below the horizon at a part of the limb: its elevation at the point below the
-    /// camera is unknown, or less than the dip.
+    /// Returns whether the light of the ground may rise below the limb, so that the edge is not the limb: in sunlight,
+    /// over a body with air, where the Sun may be below the horizon at a part of the limb. Its elevation at the point
+    /// below the camera is unknown, or less than the dip. The position of a body has its own term for the light.
     pub(crate) fn may_have_low_sun(&self) -> bool {
+        let has_lit_air = self.is_in_sunlight && !self.is_airglow && self.scale_height_m > T::ZERO;
+        if !has_lit_air || self.target().is_some() {
+            return false;
+        }
         let dip = T::from_f64(core::f64::consts::FRAC_PI_2) - self.half_angle_rad();
         self.sun_elevation_rad.is_none_or(|elevation| elevation < dip)
     }

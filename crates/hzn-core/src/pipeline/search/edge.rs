@@ -207,6 +207,7 @@ impl<T: Real, O: Observer<T>> Search<'_, T, O> {
             fallback: points.fallback,
             min_inlier_share: self.min_inlier_share(),
             raised: threshold.factor,
+            width_px: threshold.px,
             camera,
             region: binary.region,
             fit_config: &config.fit,

@@ -31,9 +31,7 @@ const MEAN_SQUARE: f64 = 1.0 / 3.0;
 // A function of its own: its sums must not lie on the stack together with those of the other terms.
 #[inline(never)]
 pub(super) fn covariance<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, expected: &Expected<T>) -> Option<M3<T>> {
-    // The position of a body has its own term for the light, and so has a body without air.
-    let applies = expected.is_in_sunlight && !expected.is_airglow && expected.scale_height_m > T::ZERO;
-    if !applies || expected.target().is_some() || !expected.may_have_low_sun() {
+    if !expected.may_have_low_sun() {
         return None;
     }
     let parts = fit.profiles.means::<T>()?;

@@ -36,6 +36,8 @@ pub(crate) struct Case<'a, T> {
     /// Factor by which the noise of the edge raises the threshold of the consensus; the largest RMS grows by the same
     /// factor.
     pub(crate) raised: T,
+    /// Largest distance of an inlier from the cone of the consensus, px.
+    pub(crate) width_px: T,
     pub(crate) camera: &'a Camera<T>,
     pub(crate) region: &'a Region<T>,
     pub(crate) fit_config: &'a fit::Config,

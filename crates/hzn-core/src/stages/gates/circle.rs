@@ -1,14 +1,11 @@
 //! Gate: a lens flare is a circle in the image, but a limb is a circle only on the sphere.
 
 use super::case::{Case, refuse_if};
-use super::residuals::radius_px;
+use super::residuals::{FULL_RADIUS_PX, radius_px};
 use super::shape::{Place, Residuals, Shape};
 use crate::base::linalg::{V3, invert_spd3};
 use crate::base::real::Real;
 use crate::model::verdict::Verdict;
-
-/// Radius of a disc below which its outline says little, in pixels.
-const LARGE_RADIUS_PX: f64 = 46.5;
 
 /// Refuses an edge whose points fit a circle of the image better than the cone. `floor_px` is the floor of the noise.
 pub(super) fn refuse<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>, floor_px: T) -> Result<(), Verdict> {
@@ -23,7 +20,7 @@ pub(super) fn refuse<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>, 
 /// is not round, which every lens has away from its axis, makes a circle an ellipse as well, and an ellipse a circle.
 /// Below the floor of the residuals, the outline of a small disc therefore says nothing.
 fn is_told<T: Real>(case: &Case<'_, T>, residuals: &Residuals<'_, T>, floor_px: T) -> bool {
-    !(radius_px(case) < T::from_f64(LARGE_RADIUS_PX)) || residuals.exceed(floor_px)
+    !(radius_px(case) < T::from_f64(FULL_RADIUS_PX)) || residuals.exceed(floor_px)
 }
 
 /// Number of Gauss-Newton steps. Two are enough from a circle through three of the points.

@@ -49,12 +49,10 @@ section! {
         /// Largest weighted RMS distance of the inliers from the limb, px; where `consensus.noise_sigma` raises the
         /// largest distance of an inlier, this limit is raised by the same factor.
         ///
-        /// Points that are evenly spread over the default width of 3 px on both sides have 1.73 px: any band of
-        /// clutter has as much. A larger value answers pictures with a poor calibration or a rough limb, and may let
-        /// edges pass that are no limb. For a disc with a radius below 40 px the limit is smaller in proportion to the
-        /// radius, down to 0.3 of it: an outline that departs from a circle by 4 % of its radius is a polygon or a
-        /// patch of light.
-        @112 max_rms_px: f64 = 1.7, [above 0.0];
+        /// A larger value answers pictures with a poor calibration or a rough limb, and may let edges pass that are no
+        /// limb. For a disc with a radius below 46 px the limit is smaller in proportion to the radius, down to a
+        /// quarter: an outline that departs from a circle by 4 % of its radius is a polygon or a patch of light.
+        @112 max_rms_px: f64 = 2.0, [above 0.0];
         /// Largest difference between the fitted and the expected half-angle, in standard deviations.
         ///
         /// The bounds are the exact half-angles at this many standard deviations of altitude and limb height, widened

@@ -116,6 +116,7 @@ impl Limb {
             fallback: 0,
             min_inlier_share: self.min_inlier_share,
             raised: 1.0,
+            width_px: 3.0,
             camera: &self.camera,
             region: &self.region,
             fit_config: &self.fit_config,
@@ -225,17 +226,16 @@ fn the_limit_of_the_residuals_shrinks_with_a_small_disc() {
         let change = |limb: &mut Limb| {
             limb.fit.rms_px = rms_px;
             if let Some(radius_px) = radius_px {
-                let (fx, _) = limb.camera.focal_px();
-                limb.fit.k = 1.0 - libm::cos(libm::asin(radius_px / fx));
+                limb.fit.k = 1.0 - libm::cos(libm::asin(radius_px / limb.camera.focal_px().0));
             }
         };
         Limb::after(change, residuals::refuse)
     };
     let refused = Err(Verdict::Residuals);
-    assert_eq!((rms(None, 1.69), rms(None, 1.71), rms(None, f64::NAN)), (Ok(()), refused, refused));
-    // 4.3 % of the radius, but at least 0.3 of the whole limit.
+    assert_eq!((rms(None, 1.99), rms(None, 2.01), rms(None, f64::NAN)), (Ok(()), refused, refused));
+    // 4.3 % of the radius, but at least a quarter of the whole limit.
     assert_eq!((rms(Some(30.0), 1.28), rms(Some(30.0), 1.30)), (Ok(()), refused));
-    assert_eq!((rms(Some(5.0), 0.50), rms(Some(5.0), 0.52)), (Ok(()), refused));
+    assert_eq!((rms(Some(5.0), 0.49), rms(Some(5.0), 0.51)), (Ok(()), refused));
 }
 
 #[test]
