@@ -41,6 +41,8 @@ const LIMB_WIDTH_UNKNOWN: f64 = 4.9;
 
 /// Returns the width of the limb by day in the counts of this tone, in scale heights: its whole step over the slope
 /// where the edge is found.
+// The gamma of the configuration is a double. Its conversion stays out of the stages, which compute in one precision.
+#[inline(never)]
 pub(crate) fn limb_width<T: Real>(tone: Option<Tone>) -> T {
     match tone.map(|tone| (tone, tone.curve::<T>())) {
         Some((Tone::Linear, _)) => T::from_f64(LIMB_WIDTH),

@@ -15,7 +15,7 @@ use crate::geometry::block::{Block, LANES, Lit};
 use crate::geometry::camera::Camera;
 use crate::geometry::frames::{Cam, Cov3, UnitVec3};
 use crate::geometry::pixel::{ImagePoint, Pixel};
-use crate::image::Pixels;
+use crate::image::{Pixels, Profiles};
 use crate::model::body::Expected;
 use crate::model::found_limb::FoundLimb;
 use crate::model::observer::{Border, Observer, Unobserved};
@@ -43,6 +43,8 @@ pub struct Edges<T> {
     focal_px: T,
     /// Fraction of the points whose lit side is clipped; 0 unless the points were picked from a picture.
     clipped: T,
+    /// Width and contrast along the edge; none unless the points were picked from a picture.
+    profiles: Profiles,
 }
 
 /// The consensus: the cone that a method of rejection finds.
@@ -164,7 +166,8 @@ impl<T: Real> Edges<T> {
             edge_points::locate_edge_points(&binary, &sensor.config().edge_points, border, 0, &mut blocks, u32::MAX);
         let point = |i: usize| (blocks[i / LANES].point(i % LANES), blocks[i / LANES].lit(i % LANES));
         let clipped = T::from_i32(made.clipped as i32) / T::from_i32(made.count.max(1) as i32);
-        Self { clipped, ..Self::from_points(sensor.camera(), (0..made.count as usize).map(point).collect()) }
+        let profiles = made.profiles;
+        Self { clipped, profiles, ..Self::from_points(sensor.camera(), (0..made.count as usize).map(point).collect()) }
     }
 
     pub(super) fn from_points(camera: &Camera<T>, points: Vec<(ImagePoint<T>, Lit)>) -> Self {
@@ -174,7 +177,14 @@ impl<T: Real> Edges<T> {
         }
         rays::to_rays(camera, &mut blocks);
         let (fx, fy) = camera.focal_px();
-        Self { blocks, points, camera: camera.clone(), focal_px: (fx + fy) * T::from_f64(0.5), clipped: T::ZERO }
+        Self {
+            blocks,
+            points,
+            camera: camera.clone(),
+            focal_px: (fx + fy) * T::from_f64(0.5),
+            clipped: T::ZERO,
+            profiles: Profiles::default(),
+        }
     }
 
     /// Returns the points in the picture, and the lit side of each as a step of ±1 along u or v.
@@ -252,7 +262,8 @@ impl<T: Real> Edges<T> {
         let expected = &expected.clipped(self.clipped);
         // The expected size depends on the direction, which is known only after the fit.
         let expected = &expected.seen_along(&fit.0.e);
-        let fused = covariance::fuse(&self.blocks, &fit.0, expected, noise, &sensor.config().fit, &self.camera, None)?;
+        let fit = fit::Fit { profiles: self.profiles, tone: sensor.config.input.tone, ..fit.0 };
+        let fused = covariance::fuse(&self.blocks, &fit, expected, noise, &sensor.config().fit, &self.camera, None)?;
         let answer = Fused {
             axis: UnitVec3::assume_unit(fused.e),
             covariance: Cov3::from_tangent(&basis(&fused.e).0, &basis(&fused.e).1, fused.p),
