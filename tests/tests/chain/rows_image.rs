@@ -57,7 +57,8 @@ fn rows_have_the_bits_of_the_picture() {
 
 /// Tests pictures with clouds, whose border pixels do not fit into the lists of the image `rows`. Pixels are left out
 /// evenly, so that an answer is near that of the picture in memory, and a picture may be refused: of the
-/// limb of the first one, 642 border pixels long, 16 to 19 points are left of 320, too few for an answer.
+/// limb of the first one, 642 border pixels long, 16 to 19 points are left of 320, too few for an answer. The second
+/// one is refused on the Cortex-M4F. Nothing tells these sensors that the Sun is high, so that the gates are stricter.
 #[test]
 #[ignore = "needs the images: cargo xtask firmware"]
 fn rows_have_no_other_direction_with_full_lists() {
@@ -73,6 +74,6 @@ fn rows_have_no_other_direction_with_full_lists() {
             let apart_deg = apart_deg(&whole.axis, &own.axis);
             assert!(apart_deg < 0.02, "{at}: {apart_deg}");
         }
-        assert!(answers >= 7, "{}: {answers}", board.core());
+        assert!(answers >= 6, "{}: {answers}", board.core());
     }
 }
