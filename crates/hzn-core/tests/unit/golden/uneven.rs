@@ -153,7 +153,7 @@ fn moved(
     .collect()
 }
 
-/// Makes the profiles of an edge with so many points, from width and contrast in each third, as powers of two.
+/// Makes the profiles of an edge of `count` points. Width and contrast of each third are given as powers of two.
 fn profiles(count: usize, widths: [u8; 3], contrasts: [u8; 3]) -> Profiles {
     let mut profiles = Profiles::default();
     for place in 0..count {
