@@ -82,26 +82,33 @@ pub struct StreamedPoint {
     // The type is f32 in both precisions, because the points of all border pixels of a picture are stored.
     pub(crate) towards_dark_px: f32,
     pub(crate) lit: Lit,
-    /// Whether the point is located at the picture's threshold, because no local mid-level was found.
-    pub(crate) fallback: bool,
-    /// Whether its lit side is clipped at full scale.
-    pub(crate) clipped: bool,
-    /// Whether one of its plateaus was not within the rows in memory.
-    pub(crate) cut: bool,
+    /// Sum of those of [`Self::FALLBACK`], [`Self::CUT`] and [`Self::CLIPPED`] that apply.
+    // With one byte for all of them the point is returned in two registers.
+    pub(crate) marks: u8,
     /// Width and contrast of the edge at the point.
     pub(crate) profile: Profile,
 }
 
 impl StreamedPoint {
+    /// The point is located at the picture's threshold, because no local mid-level was found.
+    pub(crate) const FALLBACK: u8 = 1;
+    /// One of its plateaus was not within the rows in memory.
+    pub(crate) const CUT: u8 = 2;
+    /// Its lit side is clipped at full scale.
+    pub(crate) const CLIPPED: u8 = 4;
+    /// Number of bits of the marks.
+    pub(crate) const MARK_BITS: u8 = 3;
     /// No point was found, because its search left the rows in memory.
     pub(crate) const LOST: Self = Self {
         towards_dark_px: f32::NAN,
         lit: Lit::Right,
-        fallback: false,
-        clipped: false,
-        cut: true,
+        marks: Self::CUT,
         profile: Profile { width: 0, contrast: 0 },
     };
+
+    pub(crate) fn is(&self, mark: u8) -> bool {
+        self.marks & mark > 0
+    }
 }
 
 impl<P: Pixels> Pixels for &P {

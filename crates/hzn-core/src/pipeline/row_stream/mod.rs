@@ -334,7 +334,8 @@ impl<T: Real, S: Sample> RowStream<'_, T, S> {
                 let cut = self.window.went_beyond();
                 // A point that was lost because rows are missing is counted, too.
                 if let Some(found) = found.or(cut.then_some(StreamedPoint::LOST)) {
-                    self.points.push(x, StreamedPoint { cut, ..found });
+                    let marks = found.marks | (u8::from(cut) * StreamedPoint::CUT);
+                    self.points.push(x, StreamedPoint { marks, ..found });
                 }
             }
         });

@@ -10,15 +10,12 @@ pub(super) struct Point {
     x: u16,
     /// The lit side in the lowest two bits, and the contrast of the profile.
     side: u8,
-    /// Sum of the flags [`FALLBACK`], [`CUT`] and [`CLIPPED`] that apply, and the width of the profile above them.
+    /// The marks of the point, and the width of the profile above them.
     marks: u8,
 }
 
-const FALLBACK: u8 = 1;
-const CUT: u8 = 2;
-const CLIPPED: u8 = 4;
-/// Number of bits of the flags, and of the lit side.
-const FLAGS: u8 = 3;
+const MARKS: u8 = StreamedPoint::MARK_BITS;
+/// Number of bits of the lit side.
 const SIDE: u8 = 2;
 /// The lit sides by number.
 const SIDES: [Lit; 4] = [Lit::Right, Lit::Left, Lit::Below, Lit::Above];
@@ -115,11 +112,9 @@ impl<'a> Points<'a> {
     /// Adds a point to the row that is not finished, in order of increasing columns.
     pub(super) fn push(&mut self, x: u16, found: StreamedPoint) {
         if let Some(place) = self.points.get_mut(self.used) {
-            let marks =
-                u8::from(found.fallback) * FALLBACK + u8::from(found.cut) * CUT + u8::from(found.clipped) * CLIPPED;
             let Profile { width, contrast } = found.profile;
             let side = found.lit as u8 + (contrast << SIDE);
-            let marks = marks + (width << FLAGS);
+            let marks = found.marks + (width << MARKS);
             *place = Point { towards_dark_px: found.towards_dark_px, x, side, marks };
             self.used += 1;
         }
@@ -141,14 +136,11 @@ impl<'a> Points<'a> {
         // A row is searched by halves because its points are sorted by column; a clouded row may have hundreds.
         let found = row.get(row.partition_point(|p| p.x < x)).filter(|p| p.x == x)?;
         let Point { towards_dark_px, side, marks, .. } = *found;
-        let has = |mark: u8| marks & mark > 0;
         Some(StreamedPoint {
             towards_dark_px,
             lit: SIDES[usize::from(side & 3)],
-            fallback: has(FALLBACK),
-            clipped: has(CLIPPED),
-            cut: has(CUT),
-            profile: Profile { width: marks >> FLAGS, contrast: side >> SIDE },
+            marks: marks & ((1 << MARKS) - 1),
+            profile: Profile { width: marks >> MARKS, contrast: side >> SIDE },
         })
     }
 }

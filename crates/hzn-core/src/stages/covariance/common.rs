@@ -24,6 +24,7 @@
 //! The signals vary slowly along the limb, so that a part of the points is used instead of all. This part has its own
 //! normal equations; a signal that the cone can follow is then fitted completely.
 
+use super::light;
 use super::noise::EdgeNoiseModel;
 use super::sandwich::response;
 use crate::base::linalg::{M3, V3, basis};
@@ -62,7 +63,8 @@ fn step<T: Real>(fit: &Fit<T>) -> usize {
     (fit.inliers as usize).div_ceil(PART).max(1)
 }
 
-/// Calls `add` with each term and its covariance of (δ₁₂, δc).
+/// Calls `add` with each term and its covariance of (δ₁₂, δc). The result is the covariance from light that changes
+/// along the edge, which is not among them; `None` inside where there is no such light.
 pub(super) fn add_terms<T: Real>(
     blocks: &[Block<T>],
     fit: &Fit<T>,
@@ -70,12 +72,12 @@ pub(super) fn add_terms<T: Real>(
     noise: &EdgeNoiseModel<T>,
     camera: &Camera<T>,
     mut add: impl FnMut(Term, &M3<T>),
-) -> Option<()> {
-    let sums = Sums::new(blocks, fit, camera);
+) -> Option<Option<M3<T>>> {
+    let sums = Sums::new(blocks, fit, expected, camera);
     let response = response(&fit.sums.with_normal(sums.normal), fit.mean, fit.free)?;
     let error = |sum: &V3<T>| response * sum;
     let outer = |v: &V3<T>, variance: T| v * v.transpose() * variance;
-    add(Term::CommonShift, &outer(&error(&sums.shift), noise.shift_px * noise.shift_px));
+    add(Term::CommonShift, &outer(&error(sums.by_number.shift()), noise.shift_px * noise.shift_px));
     let [tilt, bend] = sums.along();
     add(Term::CommonTilt, &outer(&error(&tilt), noise.tilt_px * noise.tilt_px));
     let bend_px = if noise.measures_bend { noise.bend_px.max(sums.strongest_shape_px()) } else { noise.bend_px };
@@ -95,7 +97,8 @@ pub(super) fn add_terms<T: Real>(
         }
         add(Term::Lens, &lens);
     }
-    Some(())
+    let light = sums.light.as_ref();
+    Some(light.and_then(|view| light::covariance(view, &sums.by_number, &response, fit, expected)))
 }
 
 /// A point of the part, as a row of the normal equations.
@@ -186,16 +189,37 @@ pub(super) fn part<'a, T: Real>(blocks: &'a [Block<T>], fit: &'a Fit<T>) -> impl
     })
 }
 
+/// Sums Σ w h g iⁿ over a part of the points for n = 0, 1 and 2, with the number i of the point: from them follows the
+/// sum for each signal g y that is a parabola y(i) along the edge.
+pub(super) struct ByNumber<T>(pub(super) [V3<T>; 3]);
+
+impl<T: Real> ByNumber<T> {
+    /// Returns Σ w h g.
+    fn shift(&self) -> &V3<T> {
+        let [shift, _, _] = &self.0;
+        shift
+    }
+
+    /// Returns Σ w h g y for the parabola y(i) through three values.
+    pub(super) fn of_curve(&self, [i0, i1, i2]: [T; 3], [y0, y1, y2]: [T; 3]) -> V3<T> {
+        let per = |from: T, to: T| (to - from).max(T::one());
+        let (first, second) = ((y1 - y0) / per(i0, i1), (y2 - y1) / per(i1, i2));
+        let curve = (second - first) / per(i0, i2);
+        // y = y₀ + first (i − i₀) + curve (i − i₀)(i − i₁)
+        let constant = y0 - first * i0 + curve * i0 * i1;
+        let slope = first - curve * (i0 + i1);
+        let [shift, by_number, by_square] = &self.0;
+        shift * constant + by_number * slope + by_square * curve
+    }
+}
+
 /// Sums Σ w h x over a part of the points, for each signal x.
 struct Sums<T> {
     /// Upper triangle of Σ w h hᵀ.
     normal: [T; 6],
-    shift: V3<T>,
-    /// Σ w h g i and Σ w h g i², where i is the number of the point. `numbers` are Σ, Σ i and Σ i² of the robust
-    /// weights, from which τ is computed.
+    by_number: ByNumber<T>,
+    /// Σ, Σ i and Σ i² of the robust weights, from which τ is computed.
     // The mean of the numbers is known only after the pass. With these sums tilt and bend need no second one.
-    by_number: V3<T>,
-    by_square: V3<T>,
     numbers: [T; 3],
     /// Σ of the robust weight times the distance from the fitted limb, px, times each of the shapes of [`shapes`].
     residuals: [T; 3],
@@ -203,20 +227,20 @@ struct Sums<T> {
     harmonics: [[V3<T>; 2]; 2],
     /// Sums for each intrinsic parameter.
     lens: [V3<T>; INTRINSICS],
+    light: Option<light::View<T>>,
 }
 
 impl<T: Real> Sums<T> {
-    fn new(blocks: &[Block<T>], fit: &Fit<T>, camera: &Camera<T>) -> Self {
+    fn new(blocks: &[Block<T>], fit: &Fit<T>, expected: &Expected<T>, camera: &Camera<T>) -> Self {
         let zero = V3::zeros();
         let mut sums = Self {
             normal: [T::ZERO; 6],
-            shift: zero,
-            by_number: zero,
-            by_square: zero,
+            by_number: ByNumber([zero; 3]),
             numbers: [T::ZERO; 3],
             residuals: [T::ZERO; 3],
             harmonics: [[zero; 2]; 2],
             lens: [zero; INTRINSICS],
+            light: light::View::new(expected),
         };
         let every = step(fit);
         let per_point = T::from_f64(2.0 * every as f64) / T::from_f64(f64::from(fit.inliers.max(1)));
@@ -227,10 +251,14 @@ impl<T: Real> Sums<T> {
             let Row { s, gradient: [gu, gv], h, weight, place, .. } = row;
             row.add_to(&mut sums.normal);
             let shift = row.shift();
-            sums.shift += shift;
             let i = T::from_i32(place as i32);
-            sums.by_number += shift * i;
-            sums.by_square += shift * (i * i);
+            let [plain, by_number, by_square] = &mut sums.by_number.0;
+            *plain += shift;
+            *by_number += shift * i;
+            *by_square += shift * (i * i);
+            if let Some(view) = &mut sums.light {
+                view.add(&row, fit, expected);
+            }
             let d = s - fit.e;
             // 1 − s·e is half of the squared distance of two unit vectors; the difference of cosines would lose the
             // digits of a small disc.
@@ -268,10 +296,25 @@ impl<T: Real> Sums<T> {
         let mean = sum / n.max(T::one());
         let spread = (squares / n.max(T::one()) - mean * mean).max(T::one()).sqrt();
         let per_number = T::from_f64(SPREAD) / spread;
-        let tilt = (self.by_number - self.shift * mean) * per_number;
+        let ByNumber([shift, by_number, by_square]) = &self.by_number;
+        let tilt = (by_number - shift * mean) * per_number;
         // Σ g τ², from τ² = (i² − 2 ī i + ī²)/(3 σ_i²).
-        let square =
-            (self.by_square - self.by_number * (mean + mean) + self.shift * (mean * mean)) * (per_number * per_number);
-        [tilt, square * T::from_f64(1.5) - self.shift * T::from_f64(0.5)]
+        let square = (by_square - by_number * (mean + mean) + shift * (mean * mean)) * (per_number * per_number);
+        [tilt, square * T::from_f64(1.5) - shift * T::from_f64(0.5)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parabola_goes_through_its_values() {
+        let points = [0.0, 1.0, 2.0, 5.0, 9.0_f64];
+        let y = |i: f64| 0.3 - 0.2 * i + 0.07 * i * i;
+        let sum = |f: &dyn Fn(f64) -> f64| points.iter().map(|i| V3::new(1.0, *i, 2.0) * f(*i)).sum::<V3<f64>>();
+        let sums = ByNumber([sum(&|_| 1.0), sum(&|i| i), sum(&|i| i * i)]);
+        let found = sums.of_curve([1.0, 4.0, 8.5], [1.0, 4.0, 8.5].map(y));
+        assert!((found - sum(&y)).norm() < 1e-12, "{found} {}", sum(&y));
     }
 }

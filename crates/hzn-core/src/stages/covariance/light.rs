@@ -13,11 +13,9 @@
 //! Each error lies between nothing and this much. No residual shows it: a smooth change along the edge is fitted as
 //! another cone. With a Sun that is known to be above the horizon of the whole edge there is no such light.
 
-use super::common::part;
-use super::sandwich::response;
-use crate::base::linalg::{M3, V3};
+use super::common::{ByNumber, Row};
+use crate::base::linalg::M3;
 use crate::base::real::Real;
-use crate::geometry::block::Block;
 use crate::model::body::Expected;
 use crate::model::tone;
 use crate::stages::fit::Fit;
@@ -30,20 +28,19 @@ const MEAN_SQUARE: f64 = 1.0 / 3.0;
 /// Returns the covariance of (δ₁₂, δc) from light that changes along the edge; `None` where there is no such light.
 // A function of its own: its sums must not lie on the stack together with those of the other terms.
 #[inline(never)]
-pub(super) fn covariance<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, expected: &Expected<T>) -> Option<M3<T>> {
-    if !expected.may_have_low_sun() {
-        return None;
-    }
-    let parts = fit.profiles.means::<T>()?;
-    let sums = Sums::new(blocks, fit, expected);
-    if sums.is_in_sunlight {
-        return None;
-    }
-    let response = response(&fit.sums.with_normal(sums.normal), fit.mean, fit.free)?;
+pub(super) fn covariance<T: Real>(
+    view: &View<T>,
+    sums: &ByNumber<T>,
+    response: &M3<T>,
+    fit: &Fit<T>,
+    expected: &Expected<T>,
+) -> Option<M3<T>> {
+    let parts = fit.profiles.means::<T>().filter(|_| !view.is_in_sunlight)?;
     let scale_px = expected.scale_height_m * expected.cos_per_m() / fit.sums.cos_per_px().max(T::from_f64(1e-20));
     let (limb_px, blur_px) = (scale_px * tone::limb_width(fit.tone), T::from_f64(BLUR_PX));
     let own_px = (limb_px * limb_px + blur_px * blur_px).sqrt();
-    let widths_px: [T; 3] = core::array::from_fn(|i| parts[i].ln_width.exp() * sums.across[i]);
+    let across = view.across();
+    let widths_px: [T; 3] = core::array::from_fn(|i| parts[i].ln_width.exp() * across[i]);
     let contrasts = parts.map(|part| part.ln_contrast);
     let mean = (contrasts[0] + contrasts[1] + contrasts[2]) * T::from_f64(1.0 / 3.0);
     let wider = widths_px.map(|width_px| (width_px - own_px).max(T::ZERO));
@@ -52,77 +49,39 @@ pub(super) fn covariance<T: Real>(blocks: &[Block<T>], fit: &Fit<T>, expected: &
     let places = parts.map(|part| part.place);
     let mut p = M3::zeros();
     for values_px in [wider, moved] {
-        let error = response * sums.of_curve(places, values_px);
+        let error = *response * sums.of_curve(places, values_px);
         p += error * error.transpose() * T::from_f64(MEAN_SQUARE);
     }
     Some(p)
 }
 
-/// Sums over a part of the points.
-struct Sums<T> {
-    normal: [T; 6],
-    /// Σ w h g iⁿ for n = 0, 1, 2, with the number i of the point.
-    by_number: [V3<T>; 3],
-    /// Pixels across the limb for each pixel along the axis of the profile, in each third of the edge.
+/// How the edge lies in the picture, and in the light of the Sun, where the Sun may be low.
+pub(super) struct View<T> {
+    /// Pixels across the limb for each pixel along the axis of the profile, summed over the points of each third.
     across: [T; 3],
-    /// Whether the Sun is known to be above the horizon at all points.
+    counts: [T; 3],
+    /// Whether the Sun is known to be above the horizon of all points.
     is_in_sunlight: bool,
 }
 
-impl<T: Real> Sums<T> {
-    fn new(blocks: &[Block<T>], fit: &Fit<T>, expected: &Expected<T>) -> Self {
-        let mut normal = [T::ZERO; 6];
-        let mut by_number = [V3::zeros(); 3];
-        let (mut across, mut counts) = ([T::ZERO; 3], [T::ZERO; 3]);
-        let mut is_in_sunlight = expected.sun_seen.is_some();
-        let thirds = fit.profiles.ends();
-        part(blocks, fit).for_each(|row| {
-            row.add_to(&mut normal);
-            let i = T::from_i32(row.place() as i32);
-            let shift = row.shift();
-            by_number[0] += shift;
-            by_number[1] += shift * i;
-            by_number[2] += shift * (i * i);
-            let third = thirds.iter().filter(|end| row.place() >= **end as usize).count();
-            across[third] += row.across_by_axis();
-            counts[third] += T::one();
-            is_in_sunlight &= expected.sun_seen.as_ref().is_some_and(|sun| row.is_in_sunlight(sun, fit));
-        });
-        for (sum, count) in across.iter_mut().zip(counts) {
-            // A third without a point of the part is taken as being along the axis.
-            *sum = if count > T::ZERO { *sum / count } else { T::one() };
-        }
-        Self { normal, by_number, across, is_in_sunlight }
+impl<T: Real> View<T> {
+    /// Makes the view of no point. It is `None` where the Sun is known to be high.
+    pub(super) fn new(expected: &Expected<T>) -> Option<Self> {
+        let is_in_sunlight = expected.sun_seen.is_some();
+        let nothing = Self { across: [T::ZERO; 3], counts: [T::ZERO; 3], is_in_sunlight };
+        expected.may_have_low_sun().then_some(nothing)
     }
 
-    /// Returns the sum Σ w h g y for the parabola y(i) through three values.
-    fn of_curve(&self, [i0, i1, i2]: [T; 3], [y0, y1, y2]: [T; 3]) -> V3<T> {
-        let per = |from: T, to: T| (to - from).max(T::one());
-        let (first, second) = ((y1 - y0) / per(i0, i1), (y2 - y1) / per(i1, i2));
-        let curve = (second - first) / per(i0, i2);
-        // y = y₀ + first (i − i₀) + curve (i − i₀)(i − i₁)
-        let constant = y0 - first * i0 + curve * i0 * i1;
-        let slope = first - curve * (i0 + i1);
-        self.by_number[0] * constant + self.by_number[1] * slope + self.by_number[2] * curve
+    pub(super) fn add(&mut self, row: &Row<T>, fit: &Fit<T>, expected: &Expected<T>) {
+        let third = fit.profiles.ends().iter().filter(|end| row.place() >= **end as usize).count();
+        self.across[third] += row.across_by_axis();
+        self.counts[third] += T::one();
+        self.is_in_sunlight &= expected.sun_seen.as_ref().is_some_and(|sun| row.is_in_sunlight(sun, fit));
     }
-}
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_parabola_goes_through_its_values() {
-        let points = [0.0, 1.0, 2.0, 5.0, 9.0_f64];
-        let y = |i: f64| 0.3 - 0.2 * i + 0.07 * i * i;
-        let sum = |f: &dyn Fn(f64) -> f64| points.iter().map(|i| V3::new(1.0, *i, 2.0) * f(*i)).sum::<V3<f64>>();
-        let sums = Sums {
-            normal: [0.0; 6],
-            by_number: [sum(&|_| 1.0), sum(&|i| i), sum(&|i| i * i)],
-            across: [1.0; 3],
-            is_in_sunlight: false,
-        };
-        let found = sums.of_curve([1.0, 4.0, 8.5], [1.0, 4.0, 8.5].map(y));
-        assert!((found - sum(&y)).norm() < 1e-12, "{found} {}", sum(&y));
+    /// Returns the means of the thirds. A third without a point of the part is taken as being along the axis.
+    fn across(&self) -> [T; 3] {
+        let mean = |i: usize| if self.counts[i] > T::ZERO { self.across[i] / self.counts[i] } else { T::one() };
+        core::array::from_fn(mean)
     }
 }

@@ -111,7 +111,7 @@ fn add_to<T: Real>(
 ) -> Option<()> {
     // Variance of the axis that the residuals add for a tilt and a bend.
     let mut shown = T::ZERO;
-    common::add_terms(blocks, fit, expected, noise, camera, |term, more| {
+    let light = common::add_terms(blocks, fit, expected, noise, camera, |term, more| {
         if term == Term::CommonBend {
             // Half of the bend looks like another half-angle. If it were added before the fusion, the expected
             // half-angle would get more weight in every picture.
@@ -131,7 +131,6 @@ fn add_to<T: Real>(
         p.common += more;
         add(Term::Weather, &more);
     }
-    let light = light::covariance(blocks, fit, expected);
     uneven::add_terms(fit, expected, shown, light, |term, more| {
         p.late += *more;
         add(term, more);

@@ -1,11 +1,11 @@
 //! The default method: locates the crossing of the mid-level along the axis of the larger gradient.
 
 use super::plateau::{Crossing, REACH};
-use super::point::{EdgePoint, orientation, point_off};
+use super::point::{Aside, EdgePoint, orientation, point_off};
 use super::reads::{Around, Line};
 use crate::base::real::Real;
 use crate::geometry::pixel::Pixel;
-use crate::image::{Pixels, Profile};
+use crate::image::Pixels;
 use crate::model::observer::Observer;
 use crate::model::work;
 use crate::stages::contour::BinaryPicture;
@@ -28,12 +28,12 @@ const FARTHEST: i32 = 1024;
 pub(super) fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     binary: &BinaryPicture<'_, T, P, O>,
     p: Pixel,
-    extra_cost: &mut u32,
+    aside: &mut Aside,
 ) -> Option<EdgePoint<T>> {
     let around = Around::<T, P, O, FREE>::new(binary, p);
     if !FREE {
         // These are nine of the 45 reads of a point, so a quarter is more than enough.
-        *extra_cost += binary.region.checks_cost(p.x, p.y, 1) / 4;
+        aside.extra_cost += binary.region.checks_cost(p.x, p.y, 1) / 4;
     }
     let near = around.read_3x3()?;
     let gradient = near.gradient();
@@ -57,23 +57,23 @@ pub(super) fn linear<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     // Sharp edges take this short way; on wide edges it would end before the plateaus, and the limb would move with the
     // light.
     if FREE && (2 * level < steep || line.at(FADED, 0).is_some_and(|v| 2 * v < level)) {
-        let Crossing { part, fallback, clipped, profile, .. } = line.crossing(near.across(lit))?;
-        return Some(EdgePoint { point: point_off(p, (dx, dy), part), lit, fallback, clipped, profile });
+        let Crossing { part, fallback, clipped, .. } = line.crossing(near.across(lit), aside)?;
+        return Some(EdgePoint { point: point_off(p, (dx, dy), part), lit, fallback, clipped });
     }
     let (half, fifth) = (4 * level / steep.max(1), 3 * level / (2 * steep.max(1)));
     let step = half.min(fifth.max(4)).clamp(1, WIDEST);
     let here = near.across(lit)[1];
     let reach = (MARGIN * step) as u16;
-    *extra_cost += work::SLOW_POINT;
+    aside.extra_cost += work::SLOW_POINT;
     let found = if is_line_clear(binary, p, (dx, dy), reach) || (FREE && is_clear(binary, p, reach)) {
-        locate_in_steps::<T, P, O, true>(binary, p, (dx, dy), step, here)?
+        locate_in_steps::<T, P, O, true>(binary, p, (dx, dy), step, here, aside)?
     } else {
-        *extra_cost += binary.region.checks_cost(p.x, p.y, reach);
-        locate_in_steps::<T, P, O, false>(binary, p, (dx, dy), step, here)?
+        aside.extra_cost += binary.region.checks_cost(p.x, p.y, reach);
+        locate_in_steps::<T, P, O, false>(binary, p, (dx, dy), step, here, aside)?
     };
-    let WideCrossing { off, fallback, clipped, profile, .. } =
-        if found.rising { recentre_profile(binary, p, (dx, dy), step, found, extra_cost) } else { found };
-    Some(EdgePoint { point: point_off(p, (dx, dy), off), lit, fallback, clipped, profile })
+    let WideCrossing { off, fallback, clipped, .. } =
+        if found.rising { recentre_profile(binary, p, (dx, dy), step, found, aside) } else { found };
+    Some(EdgePoint { point: point_off(p, (dx, dy), off), lit, fallback, clipped })
 }
 
 /// Largest number of times that a profile is read again about its crossing.
@@ -90,7 +90,7 @@ fn recentre_profile<T: Real, P: Pixels, O: Observer<T>>(
     (dx, dy): (i32, i32),
     step: i32,
     mut found: WideCrossing<T>,
-    extra_cost: &mut u32,
+    aside: &mut Aside,
 ) -> WideCrossing<T> {
     let mut whole = 0;
     for _ in 0..CLIMBS {
@@ -103,13 +103,13 @@ fn recentre_profile<T: Real, P: Pixels, O: Observer<T>>(
         if !binary.region.is_usable(x, y) {
             break;
         }
-        *extra_cost += work::SLOW_POINT;
+        aside.extra_cost += work::SLOW_POINT;
         let (p, reach) = (Pixel { x: x as u16, y: y as u16 }, (MARGIN * step) as u16);
         let next = if is_line_clear(binary, p, (dx, dy), reach) {
-            locate_from::<T, P, O, true>(binary, p, (dx, dy), step)
+            locate_from::<T, P, O, true>(binary, p, (dx, dy), step, aside)
         } else {
-            *extra_cost += binary.region.checks_cost(p.x, p.y, reach);
-            locate_from::<T, P, O, false>(binary, p, (dx, dy), step)
+            aside.extra_cost += binary.region.checks_cost(p.x, p.y, reach);
+            locate_from::<T, P, O, false>(binary, p, (dx, dy), step, aside)
         };
         let Some(next) = next else { break };
         whole += moved;
@@ -125,10 +125,11 @@ fn locate_from<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     p: Pixel,
     towards_dark: (i32, i32),
     step: i32,
+    aside: &mut Aside,
 ) -> Option<WideCrossing<T>> {
     let around = Around::<T, P, O, FREE>::new(binary, p);
     let here = Line::new(&around, towards_dark, step).smoothed(0)?;
-    locate_in_steps::<T, P, O, FREE>(binary, p, towards_dark, step, here)
+    locate_in_steps::<T, P, O, FREE>(binary, p, towards_dark, step, here, aside)
 }
 
 /// Returns whether the border of the region and all masks are more than `margin` pixels away.
@@ -161,7 +162,6 @@ struct WideCrossing<T> {
     off: T,
     fallback: bool,
     clipped: bool,
-    profile: Profile,
     /// Whether the lit side did not level off within reach.
     rising: bool,
 }
@@ -175,16 +175,17 @@ fn locate_in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     (dx, dy): (i32, i32),
     step: i32,
     here: i32,
+    aside: &mut Aside,
 ) -> Option<WideCrossing<T>> {
     let around = Around::<T, P, O, FREE>::new(binary, p);
     let line = Line::new(&around, (dx, dy), step);
-    let Crossing { part, mid2, fallback, clipped, profile, rising } =
-        line.crossing([line.smoothed(-1)?, here, line.smoothed(1)?])?;
+    let Crossing { part, mid2, fallback, clipped, rising } =
+        line.crossing([line.smoothed(-1)?, here, line.smoothed(1)?], aside)?;
     let coarse = part * T::from_i32(step);
     // The profile is curved within a step. The crossing is therefore interpolated again over half a step around it.
     let half = step / 2;
     if half == 0 {
-        return Some(WideCrossing { off: coarse, fallback, clipped, profile, rising });
+        return Some(WideCrossing { off: coarse, fallback, clipped, rising });
     }
     let pixels = Line::new(&around, (dx, dy), 1);
     let whole = (coarse + T::from_i32(REACH * WIDEST)).to_i32() - REACH * WIDEST;
@@ -193,5 +194,5 @@ fn locate_in_steps<T: Real, P: Pixels, O: Observer<T>, const FREE: bool>(
     let fine = T::from_i32(k) + T::from_i32(half * (2 * a - mid2)) / T::from_i32((2 * (a - b)).max(1));
     // In noise the short interval may have hardly any slope; its crossing would then lie anywhere.
     let off = if (fine - coarse).abs() <= T::from_i32(half) { fine } else { coarse };
-    Some(WideCrossing { off, fallback, clipped, profile, rising })
+    Some(WideCrossing { off, fallback, clipped, rising })
 }

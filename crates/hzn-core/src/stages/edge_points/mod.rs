@@ -27,12 +27,12 @@ mod zernike;
 use crate::base::real::Real;
 use crate::geometry::block::{Block, LANES};
 use crate::geometry::pixel::Pixel;
-use crate::image::{Pixels, Profiles, StreamedPoint};
+use crate::image::{Pixels, Profile, Profiles, StreamedPoint};
 use crate::model::observer::Observer;
 use crate::stages::contour::BinaryPicture;
 use linear::{MARGIN, is_clear, linear};
 use point::towards_light;
-use point::{EdgePoint, orientation, point_off};
+use point::{Aside, EdgePoint, orientation, point_off};
 use reads::Around;
 
 pub use config::{Config, SubPixel};
@@ -55,6 +55,11 @@ pub(crate) struct Points {
     pub(crate) profiles: Profiles,
 }
 
+/// Least number of the points of a long edge whose profiles are summed, evenly along the edge. The means of sixteen
+/// logarithms are known better than the term that is computed from them needs; each further profile costs as much as a
+/// tenth of a point.
+const PROFILES: usize = 48;
+
 /// Fills `blocks` with the edge points of a border, thinned evenly to `keep_points`. Empty lanes have weight 0. The
 /// function stops when points have cost more than `most_extra` in addition.
 pub(crate) fn locate_edge_points<T: Real, P: Pixels, O: Observer<T>>(
@@ -71,24 +76,25 @@ pub(crate) fn locate_edge_points<T: Real, P: Pixels, O: Observer<T>>(
         n => n.min(room),
     };
     let every = border.len().div_ceil(keep.max(1)).max(1);
-    let mut made = Points::default();
+    let (mut made, mut aside) = (Points::default(), Aside::default());
     let mut place = 0;
     // The first point lies half a step from the end, so that the points are centred on the edge.
     let pixels = border.iter().skip(every / 2).step_by(every);
     let all = pixels.len().max(1);
+    let (mut next_profile, every_profile) = (0, (all / PROFILES).max(1));
     for (number, &pixel) in pixels.enumerate() {
-        if made.extra_cost >= most_extra {
+        if aside.extra_cost >= most_extra {
             break;
         }
+        aside.wants_profile = number == next_profile;
+        if aside.wants_profile {
+            next_profile += every_profile;
+            aside.profile = Profile::default();
+        }
         let found = if P::STREAMED {
-            let found = binary.picture.streamed_point(pixel.x, pixel.y);
-            made.cut += u32::from(found.is_some_and(|f| f.cut));
-            found.filter(|f| !f.towards_dark_px.is_nan()).map(|f| {
-                let point = point_off(pixel, f.lit.towards_dark(), T::from_f64(f.towards_dark_px.into()));
-                EdgePoint { point, lit: f.lit, fallback: f.fallback, clipped: f.clipped, profile: f.profile }
-            })
+            streamed(binary, pixel, &mut made.cut, &mut aside)
         } else {
-            locate(binary, config, pixel, &mut made.extra_cost)
+            locate(binary, config, pixel, &mut aside)
         };
         let Some(found) = found else { continue };
         let Some(block) = blocks.get_mut(place / LANES) else { break };
@@ -99,13 +105,37 @@ pub(crate) fn locate_edge_points<T: Real, P: Pixels, O: Observer<T>>(
         }
         block.set_point(place % LANES, found.point, found.lit);
         binary.observer.point(candidate, found.point);
-        made.profiles.add(3 * number / all, place, found.profile);
+        if aside.wants_profile {
+            made.profiles.add(3 * number / all, place, aside.profile);
+        }
         place += 1;
         made.count += 1;
         made.fallback += u32::from(found.fallback);
         made.clipped += u32::from(found.clipped);
     }
+    made.extra_cost = aside.extra_cost;
     made
+}
+
+/// Returns the edge point at a border pixel of a picture that is not kept, and adds 1 to `cut` if its plateaus were not
+/// in the rows that were kept.
+#[inline(always)]
+fn streamed<T: Real, P: Pixels, O: Observer<T>>(
+    binary: &BinaryPicture<'_, T, P, O>,
+    p: Pixel,
+    cut: &mut u32,
+    aside: &mut Aside,
+) -> Option<EdgePoint<T>> {
+    let found = binary.picture.streamed_point(p.x, p.y)?;
+    *cut += u32::from(found.is(StreamedPoint::CUT));
+    let StreamedPoint { towards_dark_px, lit, profile, .. } = found;
+    if towards_dark_px.is_nan() {
+        return None;
+    }
+    let point = point_off(p, lit.towards_dark(), T::from_f64(towards_dark_px.into()));
+    aside.profile = profile;
+    let (fallback, clipped) = (found.is(StreamedPoint::FALLBACK), found.is(StreamedPoint::CLIPPED));
+    Some(EdgePoint { point, lit, fallback, clipped })
 }
 
 /// Locates the edge point at a border pixel.
@@ -114,7 +144,7 @@ fn locate<T: Real, P: Pixels, O: Observer<T>>(
     binary: &BinaryPicture<'_, T, P, O>,
     config: &Config,
     p: Pixel,
-    extra_cost: &mut u32,
+    aside: &mut Aside,
 ) -> Option<EdgePoint<T>> {
     match config.sub_pixel {
         // The border pixel's centre lies inside the disc: without the half pixel every disc would be half a pixel too
@@ -124,8 +154,8 @@ fn locate<T: Real, P: Pixels, O: Observer<T>>(
         SubPixel::Zernike if cfg!(feature = "zju") => zernike::locate(binary, config, p).and_then(towards_light),
         // `Config::check` refuses a method that is not built in.
         // The test is made once a point, so that the reads of most points need no test of their own.
-        _ if is_clear(binary, p, MARGIN as u16) => linear::<T, P, O, true>(binary, p, extra_cost),
-        _ => linear::<T, P, O, false>(binary, p, extra_cost),
+        _ if is_clear(binary, p, MARGIN as u16) => linear::<T, P, O, true>(binary, p, aside),
+        _ => linear::<T, P, O, false>(binary, p, aside),
     }
 }
 
@@ -137,12 +167,14 @@ pub(crate) fn locate_streamed_point<T: Real, P: Pixels, O: Observer<T>>(
     config: &Config,
     p: Pixel,
 ) -> Option<StreamedPoint> {
-    let EdgePoint { point, lit, fallback, clipped, profile } = locate(binary, config, p, &mut 0)?;
+    let mut aside = Aside { wants_profile: true, ..Aside::default() };
+    let EdgePoint { point, lit, fallback, clipped } = locate(binary, config, p, &mut aside)?;
     // The difference is exact, and the sum that restores the point from it is exact, too.
     let (dx, dy) = lit.towards_dark();
     let off =
         (point.u - T::from_i32(p.x.into())) * T::from_i32(dx) + (point.v - T::from_i32(p.y.into())) * T::from_i32(dy);
-    Some(StreamedPoint { towards_dark_px: off.to_f64() as f32, lit, fallback, clipped, cut: false, profile })
+    let marks = u8::from(fallback) * StreamedPoint::FALLBACK + u8::from(clipped) * StreamedPoint::CLIPPED;
+    Some(StreamedPoint { towards_dark_px: off.to_f64() as f32, lit, marks, profile: aside.profile })
 }
 
 fn half_pixel<T: Real, P: Pixels, O: Observer<T>>(

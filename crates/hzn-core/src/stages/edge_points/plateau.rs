@@ -1,5 +1,6 @@
 //! The plateaus on both sides of an edge, and where the brightness crosses the middle between them.
 
+use super::point::Aside;
 use super::reads::{Around, Line, UNSEEN, Walk};
 use crate::base::real::Real;
 use crate::image::{Pixels, Profile};
@@ -23,8 +24,6 @@ pub(super) struct Crossing<T> {
     pub(super) fallback: bool,
     /// Whether the lit side is clipped at full scale.
     pub(super) clipped: bool,
-    /// Width and contrast of the edge.
-    pub(super) profile: Profile,
     /// Whether the lit side did not level off within reach.
     pub(super) rising: bool,
 }
@@ -101,7 +100,7 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
     /// Locates the crossing of the mid-level. The arguments are the smoothed brightness one step to the lit side, here,
     /// and one step to the dark side.
     #[inline(always)]
-    pub(super) fn crossing(&self, [inside, first_lit, first_dark]: [i32; 3]) -> Option<Crossing<T>> {
+    pub(super) fn crossing(&self, [inside, first_lit, first_dark]: [i32; 3], aside: &mut Aside) -> Option<Crossing<T>> {
         let binary = self.around.binary;
         // The plateaus are read in one row, because a mean over several pixels is taken. The crossing is read in three
         // rows.
@@ -143,9 +142,11 @@ impl<T: Real, P: Pixels, O: Observer<T>, const FREE: bool> Line<'_, '_, '_, T, P
         let part = T::from_i32(k) + T::from_i32(2 * a - mid2) / T::from_i32(2 * (a - b));
         let full = i32::from(binary.picture.full_scale());
         let clipped = bright >= 4 * (full - full / CLIPPED_PART);
-        let (dx, dy) = self.step;
-        let profile = Profile::new(contrast, a - b, dx.abs() + dy.abs());
-        Some(Crossing { part, mid2, fallback, clipped, profile, rising: inner <= -REACH })
+        if aside.wants_profile {
+            let (dx, dy) = self.step;
+            aside.profile = Profile::new(contrast, a - b, dx.abs() + dy.abs());
+        }
+        Some(Crossing { part, mid2, fallback, clipped, rising: inner <= -REACH })
     }
 }
 

@@ -14,14 +14,23 @@ pub(super) struct EdgePoint<T> {
     pub(super) fallback: bool,
     /// Whether the lit side is clipped at full scale, so that half of its brightness is not half of the light.
     pub(super) clipped: bool,
-    /// Width and contrast of the edge at the point.
+}
+
+/// What the search for a point gives besides the point.
+// It is handed down instead of being returned, because most points are not asked for a profile.
+#[derive(Debug, Default)]
+pub(super) struct Aside {
+    /// What the points so far have cost in addition: next to a mask or the border of the picture, or on a wide edge.
+    pub(super) extra_cost: u32,
+    pub(super) wants_profile: bool,
+    /// Width and contrast of the edge at the point that was asked for them.
     pub(super) profile: Profile,
 }
 
 impl<T> EdgePoint<T> {
     /// Makes a point of a method that has no mid-level.
     pub(super) fn plain(point: ImagePoint<T>, lit: Lit) -> Self {
-        Self { point, lit, fallback: false, clipped: false, profile: Profile::default() }
+        Self { point, lit, fallback: false, clipped: false }
     }
 }
 
