@@ -28,4 +28,5 @@ mod rows;
 mod rows_image;
 mod silence;
 mod suns;
+mod untold_sun;
 mod wrong_altitude;

@@ -1,8 +1,9 @@
 //! Compares pictures that a board takes row by row with the same pictures in this machine's memory. The tests need the
 //! images that `cargo xtask firmware` builds; `cargo xtask test --all firmware` builds the images and runs the tests.
 
-use hzn_core::{Prior, Verdict, threshold};
-use hzn_flight::PictureAnswer;
+use hzn_core::verdict::Verdict;
+use hzn_core::{Prior, threshold};
+use hzn_flight::answer::PictureAnswer;
 use hzn_sim::flight::{Flight, rocket};
 use hzn_sim::{Disc, Sky};
 use hzn_tests::emulated::{Board, Case, measure_rows};
@@ -31,9 +32,9 @@ fn apart_deg(a: &[f32], b: &[f32]) -> f32 {
 }
 
 /// Returns the number of inliers of the edge that was chosen.
-fn inliers(answer: &PictureAnswer) -> f32 {
+fn inliers(answer: &PictureAnswer) -> f64 {
     let chosen = answer.edges.iter().flatten().find(|edge| edge.verdict == Verdict::Chosen as u8);
-    f32::from(chosen.expect("an edge was chosen").inliers)
+    f64::from(chosen.expect("an edge was chosen").inliers)
 }
 
 /// Tests that pictures taken row by row, without a picture in memory, give the answers of the same pictures in this
@@ -78,7 +79,7 @@ fn rows_have_no_other_direction_with_full_lists() {
             let Some(own) = there.direction else { continue };
             answers += 1;
             let whole = host.direction.expect("the picture in memory has an answer");
-            let apart_deg = apart_deg(&whole.axis, &own.axis);
+            let apart_deg = f64::from(apart_deg(&whole.axis, &own.axis));
             // The noise of a mean over fewer points is larger.
             let [all, left] = [&host, &there].map(inliers);
             assert!(apart_deg < 0.02 * (all / left).max(1.0).sqrt(), "{at}: {apart_deg} with {left} of {all} points");
