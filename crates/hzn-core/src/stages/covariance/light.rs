@@ -10,7 +10,8 @@
 //!   differs from that of the limb as much as the light differs along the edge, half of the step is off by half of the
 //!   difference. This moves the edge by half of its width times the difference of the logarithms, but not by more than
 //!   its width has room for: clouds change the light along a limb, too, and the profile only scales with it. A limb has
-//!   its own width, the same everywhere. The room is what the width differs from it, and what it changes along the edge.
+//!   its own width, the same everywhere. The room is what the width differs from it, and what it changes along the
+//!   edge.
 //!
 //! Each error lies between nothing and this much. No residual shows it: a smooth change along the edge is fitted as
 //! another cone. With a Sun that is known to be above the horizon of the whole edge there is no such light.
@@ -25,8 +26,8 @@ use crate::stages::fit::Fit;
 /// Width of a limb, and its inverse, over the width for the usual scale height: air of 220 to 290 K has 6.4 to 8.5 km,
 /// and 7.5 km is assumed.
 const SPREAD: f64 = 1.15;
-/// Largest scale height at which a profile is read to its end, in pixels: the longest of its steps. The width of a wider
-/// limb is measured too small.
+/// Largest scale height at which a profile is read to its end, in pixels: the longest of its steps. The width of a
+/// wider limb is measured too small.
 const READ_PX: f64 = 6.0;
 /// Width of a step that is blurred by a Gauss curve of 2 px, √(2π) σ: a usual lens with haze and motion has less.
 const BLUR_PX: f64 = 5.0;
@@ -67,8 +68,8 @@ pub(super) fn covariance<T: Real>(
     Some(p)
 }
 
-/// Returns how far light below the limb can have moved each third of an edge with these widths. A limb is `scales` scale
-/// heights wide.
+/// Returns how far light below the limb can have moved each third of an edge with these widths. A limb is `scales`
+/// scale heights wide.
 fn rooms_px<T: Real>(widths_px: [T; 3], scale_px: T, scales: T) -> [T; 3] {
     let (limb_px, spread) = (scale_px * scales, T::from_f64(SPREAD));
     let narrow_px = scale_px.min(T::from_f64(READ_PX)) * scales / spread;
