@@ -18,7 +18,7 @@
 //! These are the terms of (13.5), written as residuals of the fit in scaled space. The fit converts the residual
 //! cos α − σ·e = sin α dθ into errors of axis and half-angle, and those are errors of the position.
 
-use super::common::part;
+use super::part::part;
 use super::sandwich::response;
 use crate::base::linalg::{M3, V3, basis};
 use crate::base::real::Real;

@@ -16,7 +16,7 @@
 //! Each error lies between nothing and this much. No residual shows it: a smooth change along the edge is fitted as
 //! another cone. With a Sun that is known to be above the horizon of the whole edge there is no such light.
 
-use super::common::{ByNumber, Row};
+use super::part::{ByNumber, Row};
 use crate::base::linalg::M3;
 use crate::base::real::Real;
 use crate::model::body::Expected;
@@ -97,7 +97,7 @@ impl<T: Real> View<T> {
     }
 
     pub(super) fn add(&mut self, row: &Row<T>, fit: &Fit<T>, expected: &Expected<T>) {
-        let third = fit.profiles.ends().iter().filter(|end| row.place() >= **end as usize).count();
+        let third = fit.profiles.ends().iter().filter(|end| row.place >= **end as usize).count();
         self.across[third] += row.across_by_axis();
         self.counts[third] += T::one();
         self.is_in_sunlight &= expected.sun_seen.as_ref().is_some_and(|sun| row.is_in_sunlight(sun, fit));

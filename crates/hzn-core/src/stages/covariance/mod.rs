@@ -18,6 +18,7 @@ mod fusion;
 mod gauss_markov;
 mod light;
 mod noise;
+mod part;
 pub(crate) mod position;
 pub mod reml;
 mod sandwich;

@@ -10,7 +10,7 @@
 //! flattening is more than the residuals, each half has a second harmonic of its own.
 
 use super::answer::ConeCovariance;
-use super::common::{Row, part};
+use super::part::{Row, part};
 use super::sandwich::response;
 use crate::base::linalg::{V3, invert_spd2};
 use crate::base::real::Real;

@@ -6,7 +6,7 @@
 //! The degrees above two count: they bend a short arc more than the first two, and the fit takes a bend for another
 //! half-angle. No residual shows it.
 
-use super::common::part;
+use super::part::part;
 use super::sandwich::response;
 use crate::base::linalg::{M3, V3};
 use crate::base::real::Real;
