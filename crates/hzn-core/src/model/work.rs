@@ -24,7 +24,7 @@ section! {
 
 /// Default budget for each border pixel that the lists hold.
 // With the 2048 border pixels of a flight computer this gives 245 760 units. A picture may take 20 million
-// instructions, so that a unit may take 81.4. The most expensive unit found takes 81.1: no room is left.
+// instructions, so that a unit may take 81.4. The most expensive unit found takes 81.2: no room is left.
 const DEFAULT_PER_PIXEL: u32 = 120;
 
 /// Cost to begin to follow an edge.
